@@ -1,0 +1,111 @@
+!> The typed configuration of a run: what a case file says, with every default filled in and every check passed.
+!> SI units, angles in degrees, as in the case file. Names and meanings are those of `sgimp --keys`.
+module sg_config
+  use sg_kinds, only: i8, wp
+  implicit none
+  private
+
+  public :: config_t, grid_config_t, material_config_t, body_config_t, loading_config_t
+  public :: solver_config_t, random_field_config_t, monte_carlo_config_t, study_config_t
+  public :: output_config_t
+  public :: NAME_LENGTH
+
+  !> Length of names and of words out of a fixed choice.
+  integer, parameter :: NAME_LENGTH = 64
+
+  type :: grid_config_t
+    real(wp) :: x_min, x_max, y_min, y_max
+    real(wp) :: cell_size
+    character(len=NAME_LENGTH) :: left, right, bottom, top
+  end type grid_config_t
+
+  type :: material_config_t
+    character(len=NAME_LENGTH) :: name, model
+    real(wp) :: density, young, poisson
+    real(wp) :: friction_angle, dilation_angle, cohesion, tension_strength
+  end type material_config_t
+
+  type :: body_config_t
+    character(len=NAME_LENGTH) :: name, material, shape
+    !> Index into `config_t%materials`.
+    integer :: material_index
+    !> Lower left corner of a rectangle, centre of a disc.
+    real(wp) :: x, y
+    real(wp) :: width, height, radius
+    !> Corners of a polygon, x1, y1, x2, y2, ...; allocated with size 0 for other shapes.
+    real(wp), allocatable :: vertices(:)
+    !> Per direction.
+    integer :: points_per_cell
+    real(wp) :: velocity(2)
+  end type body_config_t
+
+  type :: loading_config_t
+    real(wp) :: gravity(2)
+    real(wp) :: damping
+    character(len=NAME_LENGTH) :: initial_stress
+  end type loading_config_t
+
+  type :: solver_config_t
+    character(len=NAME_LENGTH) :: weighting, scheme
+    real(wp) :: flip
+    real(wp) :: cfl
+    !> Fixed time step in s, or 0: from the CFL number.
+    real(wp) :: time_step
+    real(wp) :: end_time
+    real(wp) :: settle
+  end type solver_config_t
+
+  type :: random_field_config_t
+    character(len=NAME_LENGTH) :: property, material, distribution, acf, method
+    !> Index into `config_t%materials`.
+    integer :: material_index
+    real(wp) :: mean, cov, scale_x, scale_y, lower, upper
+  end type random_field_config_t
+
+  type :: monte_carlo_config_t
+    !> Total number of realizations of each case.
+    integer :: realizations
+    integer(i8) :: seed
+    character(len=NAME_LENGTH) :: stop_rule
+    !> Members of the homogeneous case: 1 nominal and the rest with meaningless perturbations.
+    integer :: noise_members
+    !> Share of failed members up to which the run still counts as good (exit code 0).
+    real(wp) :: max_failed_fraction
+    !> Wall clock limit of one member in s; 0 = none.
+    real(wp) :: member_seconds
+  end type monte_carlo_config_t
+
+  type :: study_config_t
+    !> Every combination is a case. Size 1 with the value of &random_field where &study does not list the key.
+    character(len=NAME_LENGTH), allocatable :: acf(:)
+    real(wp), allocatable :: cov(:)
+  end type study_config_t
+
+  type :: output_config_t
+    character(len=:), allocatable :: directory
+    !> Time between snapshots and between rows of the history, in s; 0 = none.
+    real(wp) :: snapshot_interval, history_interval
+    !> Realizations whose first and last state is written during a sweep; size 0 for none.
+    integer, allocatable :: snapshot_members(:)
+    !> Wall clock seconds between progress lines and between rewrites of ensemble.h5.
+    real(wp) :: report_seconds
+  end type output_config_t
+
+  type :: config_t
+    character(len=NAME_LENGTH) :: name
+    character(len=:), allocatable :: title
+    type(grid_config_t) :: grid
+    type(material_config_t), allocatable :: materials(:)
+    type(body_config_t), allocatable :: bodies(:)
+    type(loading_config_t) :: loading
+    type(solver_config_t) :: solver
+    !> False: no &random_field group, the run is deterministic and `random_field` holds nothing of meaning.
+    logical :: has_random_field
+    type(random_field_config_t) :: random_field
+    type(monte_carlo_config_t) :: monte_carlo
+    !> False: no &study group, the heterogeneous case is called `base`.
+    logical :: has_study
+    type(study_config_t) :: study
+    type(output_config_t) :: output
+  end type config_t
+end module sg_config
