@@ -14,7 +14,7 @@ if(CMAKE_Fortran_COMPILER_ID STREQUAL "GNU")
   # No -ffast-math: comparisons with NaN stay honest. What is given up is errno, floating point traps and
   # the sign of zero, which lets the compiler turn max, min and merge into vector instructions.
   target_compile_options(sgimp_flags INTERFACE
-    "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2008;-ffree-line-length-132;-fopenmp-simd>"
+    "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2008;-fopenmp-simd>"
     # Equality of reals is asked for on purpose (sentinels, round trips); an interface can have an argument
     # that one implementation does not need.
     "$<$<COMPILE_LANGUAGE:Fortran>:-Wall;-Wextra;-pedantic;-Wimplicit-interface;-Wno-compare-reals;-Wno-unused-dummy-argument>"
