@@ -1,7 +1,9 @@
 # Compiler flags live on one interface target; nothing is set globally.
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Release or Debug" FORCE)
+endif()
 set(SGIMP_ARCH "default" CACHE STRING
   "Instruction set: default (x86-64-v3 on x86-64), native, or any value of -march=")
-add_library(sgimp_flags INTERFACE)
 set(SGIMP_ARCH_FLAG "")
 if(SGIMP_ARCH STREQUAL "default")
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
@@ -10,14 +12,30 @@ if(SGIMP_ARCH STREQUAL "default")
 elseif(SGIMP_ARCH)
   set(SGIMP_ARCH_FLAG -march=${SGIMP_ARCH})
 endif()
+
+set(SGIMP_FLAGS_ALWAYS "")
+set(SGIMP_FLAGS_RELEASE "")
+set(SGIMP_FLAGS_DEBUG "")
 if(CMAKE_Fortran_COMPILER_ID STREQUAL "GNU")
-  # No -ffast-math: comparisons with NaN stay honest. What is given up is errno, floating point traps and
-  # the sign of zero, which lets the compiler turn max, min and merge into vector instructions.
-  target_compile_options(sgimp_flags INTERFACE
-    "$<$<COMPILE_LANGUAGE:Fortran>:-std=f2008;-fopenmp-simd>"
-    # Equality of reals is asked for on purpose (sentinels, round trips); an interface can have an argument
-    # that one implementation does not need.
-    "$<$<COMPILE_LANGUAGE:Fortran>:-Wall;-Wextra;-pedantic;-Wimplicit-interface;-Wno-compare-reals;-Wno-unused-dummy-argument>"
-    "$<$<AND:$<COMPILE_LANGUAGE:Fortran>,$<CONFIG:Release>>:${SGIMP_ARCH_FLAG};-fno-math-errno;-fno-trapping-math;-fno-signed-zeros>"
-    "$<$<AND:$<COMPILE_LANGUAGE:Fortran>,$<CONFIG:Debug>>:-fcheck=all;-finit-real=snan;-ffpe-trap=invalid,zero,overflow;-fbacktrace>")
+  set(SGIMP_FLAGS_ALWAYS -std=f2008 -fopenmp-simd)
+  # Equality of reals is asked for on purpose (sentinels, round trips); an interface can have an argument
+  # that one implementation does not need.
+  set(SGIMP_FLAGS_WARNINGS -Wall -Wextra -pedantic -Wimplicit-interface -Wno-compare-reals
+    -Wno-unused-dummy-argument)
+  # CMake adds -O3. No -ffast-math: comparisons with NaN stay honest. What is given up is errno, floating point
+  # traps and the sign of zero, which lets the compiler turn max, min and merge into vector instructions.
+  set(SGIMP_FLAGS_RELEASE ${SGIMP_ARCH_FLAG} -fno-math-errno -fno-trapping-math -fno-signed-zeros)
+  set(SGIMP_FLAGS_DEBUG -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow -fbacktrace)
 endif()
+
+add_library(sgimp_flags INTERFACE)
+target_compile_options(sgimp_flags INTERFACE
+  "$<$<COMPILE_LANGUAGE:Fortran>:${SGIMP_FLAGS_ALWAYS};${SGIMP_FLAGS_WARNINGS}>"
+  "$<$<AND:$<COMPILE_LANGUAGE:Fortran>,$<CONFIG:Release>>:${SGIMP_FLAGS_RELEASE}>"
+  "$<$<AND:$<COMPILE_LANGUAGE:Fortran>,$<CONFIG:Debug>>:${SGIMP_FLAGS_DEBUG}>")
+
+# One line for the provenance of results: what bears on numbers.
+string(TOUPPER "${CMAKE_BUILD_TYPE}" SGIMP_BUILD_TYPE_UPPER)
+string(JOIN " " SGIMP_COMPILER_FLAGS
+  ${CMAKE_Fortran_FLAGS} ${CMAKE_Fortran_FLAGS_${SGIMP_BUILD_TYPE_UPPER}}
+  ${SGIMP_FLAGS_ALWAYS} ${SGIMP_FLAGS_${SGIMP_BUILD_TYPE_UPPER}})

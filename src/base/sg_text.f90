@@ -46,10 +46,13 @@ contains
   pure function real_to_text(value) result(text)
     real(wp), intent(in) :: value
     character(len=:), allocatable :: text
-    integer :: digits, status
+    integer :: digits, fewest, status
     real(wp) :: back
 
-    do digits = 1, 17
+    fewest = 1
+    ! Rounded to fewer digits, the largest numbers would overflow when they are read.
+    if (abs(value) > 1.7e308_wp) fewest = 17
+    do digits = fewest, 17
       text = real_to_text_digits(value, digits)
       read (text, *, iostat=status) back
       if (status == 0 .and. back == value) return
