@@ -3,7 +3,7 @@ set(SGIMP_MISSING "")
 
 # sgimp_missing(what "Debian packages" "Spack packages")
 macro(sgimp_missing what debian spack)
-  list(APPEND SGIMP_MISSING "  ${what}: Debian ${debian}; Spack ${spack}")
+  list(APPEND SGIMP_MISSING "  ${what}: Debian ${debian} / Spack ${spack}")
 endmacro()
 
 find_package(MPI QUIET COMPONENTS Fortran)

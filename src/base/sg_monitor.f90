@@ -1,6 +1,6 @@
 !> What a long computation asks, now and then, of whoever started it: may I go on?
-!> It lets the solver be interrupted and lets rank 0 serve other ranks while it computes, without the solver
-!> knowing of MPI, signals or files.
+!> It lets the solver be interrupted and lets rank 0 serve other ranks while it computes, without
+!> the solver knowing of MPI, signals or files.
 module sg_monitor
   implicit none
   private
@@ -24,6 +24,7 @@ module sg_monitor
     !> Called every few milliseconds of computing; one of GO_ON, ABANDON, OUT_OF_TIME.
     function ask_interface(this) result(answer)
       import :: monitor_t
+      implicit none
       class(monitor_t), intent(inout) :: this
       integer :: answer
     end function ask_interface

@@ -6,8 +6,8 @@ module sg_text
 
   public :: to_text, lower_case, edit_distance, text_of_duration
 
-  !> Shortest text of a value: integers without blanks, reals so that reading gives back the same bits,
-  !> logicals as true and false.
+  !> Shortest text of a value: integers without blanks, reals so that reading gives back the same
+  !> bits, logicals as true and false.
   interface to_text
     module procedure integer_to_text
     module procedure long_to_text
@@ -59,7 +59,8 @@ contains
     end do
   end function real_to_text
 
-  !> `digits` significant digits, without trailing zeros; plain notation from 1e-4 to 1e7, else with exponent.
+  !> `digits` significant digits, without trailing zeros; plain notation from 1e-4 to 1e7, else with
+  !> exponent.
   pure function real_to_text_digits(value, digits) result(text)
     real(wp), intent(in) :: value
     integer, intent(in) :: digits

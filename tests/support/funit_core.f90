@@ -1,6 +1,6 @@
-!> Heart of the small test runner that stands in for pFUnit: it counts tests and failures and compares values.
-!> The names that tests use are those of pFUnit. The counters are module variables, against the house rule,
-!> because asserts are free procedures, as in pFUnit.
+!> Heart of the small test runner that stands in for pFUnit: it counts tests and failures and
+!> compares values. The names that tests use are those of pFUnit. The counters are module variables,
+!> against the house rule, because asserts are free procedures, as in pFUnit.
 module funit_core
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
   use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int
@@ -23,8 +23,10 @@ module funit_core
 
   integer, parameter :: EQUAL = 1, NOT_EQUAL = 2, LESS = 3, LESS_OR_EQUAL = 4
   integer, parameter :: GREATER = 5, GREATER_OR_EQUAL = 6, RELATIVELY_EQUAL = 7
-  character(len=*), parameter :: RELATION_NAMES(7) = [character(len=24) :: 'equal to', 'different from', &
-    'less than', 'less than or equal to', 'greater than', 'greater than or equal to', 'relatively equal to']
+  character(len=*), parameter :: RELATION_NAMES(7) = [character(len=24) :: &
+    'equal to', 'different from', &
+    'less than', 'less than or equal to', 'greater than', 'greater than or equal to', &
+    'relatively equal to']
 
   interface assertTrue
     module procedure assert_true, assert_true_all
@@ -48,11 +50,13 @@ module funit_core
   interface
     function c_atexit(handler) bind(C, name='atexit') result(status)
       import :: c_funptr, c_int
+      implicit none
       type(c_funptr), value :: handler
       integer(c_int) :: status
     end function c_atexit
     subroutine c_exit_now(status) bind(C, name='_exit')
       import :: c_int
+      implicit none
       integer(c_int), value :: status
     end subroutine c_exit_now
   end interface
@@ -107,7 +111,8 @@ contains
     if (tests_run == 0) then
       write (output_unit, '(3a)') 'FAILED: no test matches "', trim(filter), '".'
     else if (passed) then
-      write (output_unit, '(a, i0, a, i0, a)') 'PASSED: ', tests_run, ' tests of ', file_count, ' files.'
+      write (output_unit, '(a, i0, a, i0, a)') &
+        'PASSED: ', tests_run, ' tests of ', file_count, ' files.'
     else
       write (output_unit, '(a, i0, a, i0, a, i0, a)') &
         'FAILED: ', tests_failed, ' of ', tests_run, ' tests of ', file_count, ' files.'
@@ -181,8 +186,9 @@ contains
     on_rank = ''
     if (rank >= 0) write (on_rank, '(a, i0)') ' on rank ', rank
     if (present(location)) place = location
-    write (output_unit, '(2a, i0, 6a)', advance='no') trim(place%file_name), ':', place%line_number, &
-      ': ', trim(current_test), trim(on_rank), ': ', what, ' '
+    write (output_unit, '(2a, i0, 6a)', advance='no') &
+      trim(place%file_name), ':', place%line_number, ': ', trim(current_test), trim(on_rank), &
+      ': ', what, ' '
     if (present(message)) write (output_unit, '(3a)', advance='no') '(', message, ')'
     write (output_unit, '(a)') ''
     flush (output_unit)
@@ -260,8 +266,10 @@ contains
 
     same = size(shape_a) == size(shape_b)
     if (same) same = all(shape_a == shape_b)
-    if (.not. same) call fail('shapes '//shape_text(shape_a)//' and '//shape_text(shape_b)//' differ', &
-      message, location)
+    if (.not. same) then
+      call fail('shapes '//shape_text(shape_a)//' and '//shape_text(shape_b)//' differ', &
+        message, location)
+    end if
   end subroutine assertSameShape
 
   ! Kinds of numbers.
@@ -291,7 +299,9 @@ contains
     real(real64), intent(in) :: x
     character(len=*), intent(in), optional :: message
     type(SourceLocation), intent(in), optional :: location
-    if (.not. ieee_is_finite(x)) call fail('expected a finite number, got '//real_text(x), message, location)
+    if (.not. ieee_is_finite(x)) then
+      call fail('expected a finite number, got '//real_text(x), message, location)
+    end if
   end subroutine assert_is_finite_64
 
   subroutine assert_is_infinite_32(x, message, location)
@@ -305,7 +315,9 @@ contains
     real(real64), intent(in) :: x
     character(len=*), intent(in), optional :: message
     type(SourceLocation), intent(in), optional :: location
-    if (ieee_is_finite(x)) call fail('expected an infinite number, got '//real_text(x), message, location)
+    if (ieee_is_finite(x)) then
+      call fail('expected an infinite number, got '//real_text(x), message, location)
+    end if
   end subroutine assert_is_infinite_64
 
   ! Text: as in pFUnit, blanks at both ends do not count.
@@ -340,10 +352,11 @@ contains
     end do
   end subroutine assert_equal_text_many
 
-  ! Comparisons of flat arrays; the shapes are those of the arguments of the assert. An expected scalar
-  ! stands for all elements. Stops at the first element that fails.
+  ! Comparisons of flat arrays; the shapes are those of the arguments of the assert. An expected
+  ! scalar stands for all elements. Stops at the first element that fails.
 
-  subroutine compare_integers(relation, expected, expected_shape, actual, actual_shape, message, location)
+  subroutine compare_integers(relation, expected, expected_shape, actual, actual_shape, &
+      message, location)
     integer, intent(in) :: relation
     integer(int64), intent(in) :: expected(:), actual(:)
     integer, intent(in) :: expected_shape(:), actual_shape(:)
@@ -392,12 +405,16 @@ contains
       j = min(i, size(expected))
       if (.not. real_relation_holds(relation, expected(j), actual(i), tolerance)) then
         note = place_text(i, actual_shape)
-        if (relation == EQUAL) note = note//', difference '//real_text(actual(i) - expected(j))// &
-          ', tolerance '//real_text(tolerance)
-        if (relation == RELATIVELY_EQUAL) note = note//', relative difference '// &
-          real_text(abs(actual(i) - expected(j))/max(abs(expected(j)), tiny(1.0_real64)))// &
-          ', tolerance '//real_text(tolerance)
-        call fail_comparison(relation, real_text(expected(j)), real_text(actual(i)), note, message, location)
+        if (relation == EQUAL) then
+          note = note//', difference '//real_text(actual(i) - expected(j))//', tolerance '// &
+            real_text(tolerance)
+        else if (relation == RELATIVELY_EQUAL) then
+          note = note//', relative difference '// &
+            real_text(abs(actual(i) - expected(j))/max(abs(expected(j)), tiny(1.0_real64)))// &
+            ', tolerance '//real_text(tolerance)
+        end if
+        call fail_comparison(relation, real_text(expected(j)), real_text(actual(i)), note, &
+          message, location)
         return
       end if
     end do
@@ -417,8 +434,9 @@ contains
     select case (relation)
     case (EQUAL)
       holds = expected == actual
-      if (.not. holds .and. ieee_is_finite(expected) .and. ieee_is_finite(actual)) &
+      if (.not. holds .and. ieee_is_finite(expected) .and. ieee_is_finite(actual)) then
         holds = abs(actual - expected) <= tolerance
+      end if
     case (NOT_EQUAL)
       holds = expected /= actual
     case (LESS)
@@ -431,12 +449,14 @@ contains
       holds = expected >= actual
     case default
       holds = .false.
-      if (ieee_is_finite(expected) .and. ieee_is_finite(actual)) &
+      if (ieee_is_finite(expected) .and. ieee_is_finite(actual)) then
         holds = abs(actual - expected) <= tolerance*abs(expected)
+      end if
     end select
   end function real_relation_holds
 
-  subroutine compare_logicals(relation, expected, expected_shape, actual, actual_shape, message, location)
+  subroutine compare_logicals(relation, expected, expected_shape, actual, actual_shape, &
+      message, location)
     integer, intent(in) :: relation
     logical, intent(in) :: expected(:), actual(:)
     integer, intent(in) :: expected_shape(:), actual_shape(:)
@@ -468,7 +488,8 @@ contains
     if (relation == EQUAL .or. relation == RELATIVELY_EQUAL) then
       call fail('expected '//expected//', got '//actual//note, message, location)
     else
-      call fail(expected//' is not '//trim(RELATION_NAMES(relation))//' '//actual//note, message, location)
+      call fail(expected//' is not '//trim(RELATION_NAMES(relation))//' '//actual//note, &
+        message, location)
     end if
   end subroutine fail_comparison
 

@@ -1,22 +1,24 @@
 !> What MPI tests `use`: everything of funit, and the object that a test gets its ranks from.
 module pfunit
   use funit
-  use funit_core, only: funit_end_with, funit_failures_here, funit_finished, funit_report, funit_set_rank
+  use funit_core, only: funit_end_with, funit_failures_here, funit_finished, funit_report, &
+    funit_set_rank
   use mpi_f08, only: MPI_COMM_NULL, MPI_COMM_WORLD, MPI_Comm, MPI_INTEGER, MPI_LOGICAL, MPI_SUM, &
-    MPI_UNDEFINED, MPI_Allreduce, MPI_Bcast, MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split, &
-    MPI_Finalize, MPI_Init, operator(/=)
+    MPI_UNDEFINED, MPI_Allreduce, MPI_Bcast, MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, &
+    MPI_Comm_split, MPI_Finalize, MPI_Init, operator(/=)
   implicit none
-  private :: MPI_COMM_NULL, MPI_COMM_WORLD, MPI_Comm, MPI_INTEGER, MPI_LOGICAL, MPI_SUM, MPI_UNDEFINED, &
-    MPI_Allreduce, MPI_Bcast, MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split, MPI_Finalize, &
-    MPI_Init, operator(/=), funit_end_with, funit_failures_here, funit_finished, funit_report, funit_set_rank
+  private :: funit_end_with, funit_failures_here, funit_finished, funit_report, funit_set_rank
+  private :: MPI_COMM_NULL, MPI_COMM_WORLD, MPI_Comm, MPI_INTEGER, MPI_LOGICAL, MPI_SUM
+  private :: MPI_UNDEFINED, MPI_Allreduce, MPI_Bcast, MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size
+  private :: MPI_Comm_split, MPI_Finalize, MPI_Init, operator(/=)
   private :: begin, finish, is_active, get_communicator, get_rank, get_size
 
   !> A test on the first `npes` ranks.
   type :: MpiTestMethod
     type(MPI_Comm), private :: communicator
   contains
-    !> Handle of a communicator that holds the ranks of this test, as in pFUnit an integer by default
-    !> (`communicator%mpi_val` of mpi_f08).
+    !> Handle of a communicator that holds the ranks of this test, as in pFUnit an integer by
+    !> default (`communicator%mpi_val` of mpi_f08).
     procedure :: getMpiCommunicator => get_communicator
     !> Rank in that communicator.
     procedure :: getProcessRank => get_rank
@@ -38,7 +40,9 @@ contains
     call MPI_Comm_size(MPI_COMM_WORLD, world_size)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)
     if (world_size < ranks) then
-      if (rank == 0) write (*, '(a, i0, a)') 'FAILED: these tests need mpirun with ', ranks, ' ranks.'
+      if (rank == 0) then
+        write (*, '(a, i0, a)') 'FAILED: these tests need mpirun with ', ranks, ' ranks.'
+      end if
       call MPI_Finalize()
       stop 1
     end if
@@ -69,7 +73,8 @@ contains
 
     call funit_begin(name)
     call MPI_Comm_rank(MPI_COMM_WORLD, rank)
-    call MPI_Comm_split(MPI_COMM_WORLD, merge(0, MPI_UNDEFINED, rank < npes), rank, this%communicator)
+    call MPI_Comm_split(MPI_COMM_WORLD, merge(0, MPI_UNDEFINED, rank < npes), rank, &
+      this%communicator)
   end subroutine begin
 
   !> Collective on all ranks of the program: the test has failed if it failed on any.
