@@ -10,7 +10,7 @@ module funit_core
 
   public :: SourceLocation, anyExceptions
   public :: assertTrue, assertFalse, assertAll, assertAny, assertNone, assertNotAll, assertFail
-  public :: assertIsNaN, assertIsFinite, assertIsInfinite, assertSameShape, assertEqual
+  public :: assertIsNaN, assertIsFinite, assertSameShape, assertEqual
   public :: compare_integers, compare_reals, compare_logicals
   public :: EQUAL, NOT_EQUAL, LESS, LESS_OR_EQUAL, GREATER, GREATER_OR_EQUAL, RELATIVELY_EQUAL
   public :: funit_open, funit_close, funit_is_wanted, funit_begin, funit_end, funit_end_with
@@ -40,9 +40,6 @@ module funit_core
   interface assertIsFinite
     module procedure assert_is_finite_32, assert_is_finite_64
   end interface assertIsFinite
-  interface assertIsInfinite
-    module procedure assert_is_infinite_32, assert_is_infinite_64
-  end interface assertIsInfinite
   interface assertEqual
     module procedure assert_equal_text, assert_equal_text_one_many, assert_equal_text_many
   end interface assertEqual
@@ -303,22 +300,6 @@ contains
       call fail('expected a finite number, got '//real_text(x), message, location)
     end if
   end subroutine assert_is_finite_64
-
-  subroutine assert_is_infinite_32(x, message, location)
-    real(real32), intent(in) :: x
-    character(len=*), intent(in), optional :: message
-    type(SourceLocation), intent(in), optional :: location
-    call assert_is_infinite_64(real(x, real64), message, location)
-  end subroutine assert_is_infinite_32
-
-  subroutine assert_is_infinite_64(x, message, location)
-    real(real64), intent(in) :: x
-    character(len=*), intent(in), optional :: message
-    type(SourceLocation), intent(in), optional :: location
-    if (ieee_is_finite(x)) then
-      call fail('expected an infinite number, got '//real_text(x), message, location)
-    end if
-  end subroutine assert_is_infinite_64
 
   ! Text: as in pFUnit, blanks at both ends do not count.
 

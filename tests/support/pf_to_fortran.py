@@ -33,7 +33,6 @@ ASSERTS = {
     "notall": (1, False),
     "isnan": (1, False),
     "isfinite": (1, False),
-    "isinfinite": (1, False),
     "fail": (1, False),
 }
 SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(?:\(([\w\s,]*)\))?\s*(?:!.*)?$", re.IGNORECASE)
