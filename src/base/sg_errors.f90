@@ -1,5 +1,6 @@
-!> The one error type. A routine that can fail takes `type(error_t), allocatable, intent(out) ::
-!> error` last and returns at once when it is set; only the main program turns it into an exit code.
+!> The one error type. A routine that can fail takes, as its last argument,
+!> `type(error_t), allocatable, intent(out) :: error` and returns at once when it is set; only the
+!> main program turns it into an exit code.
 module sg_errors
   implicit none
   private
