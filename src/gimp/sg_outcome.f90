@@ -8,7 +8,7 @@ module sg_outcome
   public :: outcome_t, column_t, COLUMNS, COLUMN_COUNT, reset_outcome
   public :: status_text
   public :: STATUS_OK, STATUS_NOT_FINITE, STATUS_POINT_LOST, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT
-  public :: STATUS_RUNAWAY, STATUS_FIELD_FAILED
+  public :: STATUS_RUNAWAY, STATUS_FIELD_FAILED, STATUS_ABANDONED
   public :: RUNOUT_MAX, RUNOUT_Q99, RUNOUT_Q995, RUNOUT_CONNECTED, HEIGHT_MAX, HEIGHT_WALL
   public :: SETTLE_TIME, SETTLED, KINETIC_ENERGY_END, KINETIC_ENERGY_RATIO, WALL_TOUCHED
   public :: ENERGY_ERROR, MASS_ERROR
@@ -16,6 +16,8 @@ module sg_outcome
   public :: FAILURE_STEP, FAILURE_POINT, FAILURE_X, FAILURE_Y
 
   integer, parameter :: STATUS_OK = 0
+  !> Asked to stop before it ended: computed again later, never recorded.
+  integer, parameter :: STATUS_ABANDONED = -1
   integer, parameter :: STATUS_NOT_FINITE = 1
   integer, parameter :: STATUS_POINT_LOST = 2
   integer, parameter :: STATUS_STEP_COLLAPSE = 3

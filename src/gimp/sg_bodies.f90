@@ -1,0 +1,101 @@
+!> Bodies: shapes filled with points on a regular lattice.
+module sg_bodies
+  use sg_config, only: body_config_t
+  use sg_kinds, only: wp
+  implicit none
+  private
+
+  public :: lattice_t, fill_body, body_extent
+
+  !> The points of one body: positions [count] in m, and full width and height of a point in m.
+  type :: lattice_t
+    integer :: count = 0
+    real(wp), allocatable :: x(:), y(:)
+    real(wp) :: width, height
+  end type lattice_t
+
+contains
+
+  !> Lower left and upper right corner of the box around a body: (x_min, x_max, y_min, y_max) in m.
+  pure function body_extent(body) result(box)
+    type(body_config_t), intent(in) :: body
+    real(wp) :: box(4)
+
+    select case (body%shape)
+    case ('disc')
+      box = [body%x - body%radius, body%x + body%radius, body%y - body%radius, body%y + body%radius]
+    case ('polygon')
+      box(1:2) = [minval(body%vertices(1::2)), maxval(body%vertices(1::2))]
+      box(3:4) = [minval(body%vertices(2::2)), maxval(body%vertices(2::2))]
+    case default
+      box = [body%x, body%x + body%width, body%y, body%y + body%height]
+    end select
+  end function body_extent
+
+  !> Points at the centres of the lattice cells whose centre lies in the body, x fastest. The lattice starts at the
+  !> lower left corner of the body's box; its spacing is `cell_size` over the points per cell, or a little less where
+  !> the box is no multiple of it.
+  pure subroutine fill_body(body, cell_size, lattice)
+    type(body_config_t), intent(in) :: body
+    real(wp), intent(in) :: cell_size
+    type(lattice_t), intent(out) :: lattice
+    real(wp) :: box(4), x, y
+    integer :: columns, rows, i, j, count
+
+    box = body_extent(body)
+    columns = whole_number(box(2) - box(1))
+    rows = whole_number(box(4) - box(3))
+    lattice%width = (box(2) - box(1))/columns
+    lattice%height = (box(4) - box(3))/rows
+    allocate (lattice%x(columns*rows), lattice%y(columns*rows))
+    count = 0
+    do j = 1, rows
+      do i = 1, columns
+        x = box(1) + (i - 0.5_wp)*lattice%width
+        y = box(3) + (j - 0.5_wp)*lattice%height
+        if (.not. is_inside(body, x, y)) cycle
+        count = count + 1
+        lattice%x(count) = x
+        lattice%y(count) = y
+      end do
+    end do
+    lattice%count = count
+    lattice%x = lattice%x(:count)
+    lattice%y = lattice%y(:count)
+
+  contains
+
+    !> Number of lattice cells along a length: the ratio rounded up, but not for rounding errors.
+    pure function whole_number(length) result(number)
+      real(wp), intent(in) :: length
+      integer :: number
+      number = max(1, ceiling(length/cell_size*body%points_per_cell - 1.0e-9_wp))
+    end function whole_number
+  end subroutine fill_body
+
+  !> Is (x, y) in the body? For polygons by the number of edges crossed to the right (even-odd rule).
+  pure function is_inside(body, x, y) result(inside)
+    type(body_config_t), intent(in) :: body
+    real(wp), intent(in) :: x, y
+    logical :: inside
+    real(wp) :: x1, y1, x2, y2
+    integer :: k, corners
+
+    inside = .true.
+    select case (body%shape)
+    case ('disc')
+      inside = (x - body%x)**2 + (y - body%y)**2 <= body%radius**2
+    case ('polygon')
+      inside = .false.
+      corners = size(body%vertices)/2
+      do k = 1, corners
+        x1 = body%vertices(2*k - 1)
+        y1 = body%vertices(2*k)
+        x2 = body%vertices(2*mod(k, corners) + 1)
+        y2 = body%vertices(2*mod(k, corners) + 2)
+        if ((y1 > y) .eqv. (y2 > y)) cycle
+        if (x < x1 + (y - y1)/(y2 - y1)*(x2 - x1)) inside = .not. inside
+      end do
+    end select
+  end function is_inside
+end module sg_bodies

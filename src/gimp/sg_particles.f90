@@ -1,0 +1,89 @@
+!> Material points ("particles") and the bodies they belong to, as one array per quantity.
+!> Points of a body are consecutive, so that a loop over a body needs no look-up of its material.
+!> Plane strain: quantities are per metre of thickness. Stress is positive in tension.
+module sg_particles
+  use sg_kinds, only: wp
+  implicit none
+  private
+
+  public :: particles_t, body_points_t, copy_particles
+
+  !> The points of one body.
+  type :: body_points_t
+    !> First and last point in the arrays of `particles_t`.
+    integer :: first, last
+    !> Index into the materials of the scene.
+    integer :: material
+    !> Full width and height of a point, in m; it does not change (uGIMP).
+    real(wp) :: width, height
+  end type body_points_t
+
+  type :: particles_t
+    integer :: count = 0
+    type(body_points_t), allocatable :: bodies(:)
+    !> Position and velocity, [count], in m and m/s.
+    real(wp), allocatable :: x(:), y(:), vx(:), vy(:)
+    !> Initial position, [count], in m.
+    real(wp), allocatable :: x_start(:), y_start(:)
+    !> Mass in kg/m and current volume in m^2 (per metre of thickness), [count].
+    real(wp), allocatable :: mass(:), volume(:)
+    !> Cauchy stress, [count], in Pa.
+    real(wp), allocatable :: sxx(:), syy(:), szz(:), sxy(:)
+    !> Volumetric opening of a point that carries no stress, [count]; a strain >= 0.
+    real(wp), allocatable :: gap(:)
+    !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the largest
+    !> principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
+    real(wp), allocatable :: sin_friction(:), cohesion_term(:), tension_limit(:)
+    !> Friction angle as it was given, [count], in degrees; for output only.
+    real(wp), allocatable :: friction_angle(:)
+    !> Equivalent deviatoric plastic strain, [count]; size 0 where nobody asked for it.
+    real(wp), allocatable :: plastic_strain(:)
+  contains
+    procedure :: init => init_particles
+    procedure :: has_plastic_strain
+  end type particles_t
+
+contains
+
+  !> All arrays at the length `count` and zero; `track_plastic_strain` also keeps the plastic strain.
+  subroutine init_particles(this, count, track_plastic_strain)
+    class(particles_t), intent(out) :: this
+    integer, intent(in) :: count
+    logical, intent(in) :: track_plastic_strain
+
+    this%count = count
+    allocate (this%x(count), this%y(count), this%vx(count), this%vy(count))
+    allocate (this%x_start(count), this%y_start(count), this%mass(count), this%volume(count))
+    allocate (this%sxx(count), this%syy(count), this%szz(count), this%sxy(count))
+    allocate (this%gap(count), this%sin_friction(count), this%cohesion_term(count))
+    allocate (this%tension_limit(count), this%friction_angle(count))
+    allocate (this%plastic_strain(merge(count, 0, track_plastic_strain)))
+    this%x = 0.0_wp; this%y = 0.0_wp; this%vx = 0.0_wp; this%vy = 0.0_wp
+    this%x_start = 0.0_wp; this%y_start = 0.0_wp; this%mass = 0.0_wp; this%volume = 0.0_wp
+    this%sxx = 0.0_wp; this%syy = 0.0_wp; this%szz = 0.0_wp; this%sxy = 0.0_wp
+    this%gap = 0.0_wp; this%sin_friction = 0.0_wp; this%cohesion_term = 0.0_wp
+    this%tension_limit = 0.0_wp; this%friction_angle = 0.0_wp
+    this%plastic_strain = 0.0_wp
+  end subroutine init_particles
+
+  !> Is the plastic strain kept?
+  pure function has_plastic_strain(this) result(has)
+    class(particles_t), intent(in) :: this
+    logical :: has
+    has = size(this%plastic_strain) == this%count
+  end function has_plastic_strain
+
+  !> A fresh copy of `source` for one member, with or without plastic strain.
+  subroutine copy_particles(source, track_plastic_strain, target)
+    type(particles_t), intent(in) :: source
+    logical, intent(in) :: track_plastic_strain
+    type(particles_t), intent(out) :: target
+
+    target = source
+    if (track_plastic_strain .neqv. target%has_plastic_strain()) then
+      deallocate (target%plastic_strain)
+      allocate (target%plastic_strain(merge(target%count, 0, track_plastic_strain)))
+      target%plastic_strain = 0.0_wp
+    end if
+  end subroutine copy_particles
+end module sg_particles

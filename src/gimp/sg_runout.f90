@@ -1,0 +1,140 @@
+!> What is measured on a state of the points: runout by four definitions, heights, profile, energies.
+!> Runouts are measured from the initial toe of the bodies, in m, towards +x.
+module sg_runout
+  use sg_kinds, only: sp, wp
+  use sg_materials, only: material_t
+  use sg_particles, only: particles_t
+  use sg_sorting, only: sort_index
+  implicit none
+  private
+
+  public :: farthest_edge, mass_front, deposit_depth, connected_front, surface_height
+  public :: elastic_energy, potential_energy, angular_momentum
+
+contains
+
+  !> Position of the farthest edge of any point, in m.
+  pure function farthest_edge(particles) result(x)
+    type(particles_t), intent(in) :: particles
+    real(wp) :: x
+    integer :: body
+
+    x = -huge(1.0_wp)
+    do body = 1, size(particles%bodies)
+      associate (b => particles%bodies(body))
+        x = max(x, maxval(particles%x(b%first:b%last)) + 0.5_wp*b%width)
+      end associate
+    end do
+  end function farthest_edge
+
+  !> Positions behind which the given shares of the mass lie, in m: the centre of the point at which the mass
+  !> summed from the right passes the rest.
+  function mass_front(particles, shares) result(x)
+    type(particles_t), intent(in) :: particles
+    real(wp), intent(in) :: shares(:)
+    real(wp) :: x(size(shares))
+    integer :: order(particles%count)
+    real(wp) :: total, summed
+    integer :: k, s
+
+    order = sort_index(particles%x)
+    total = sum(particles%mass)
+    do s = 1, size(shares)
+      summed = 0.0_wp
+      do k = particles%count, 1, -1
+        summed = summed + particles%mass(order(k))
+        if (summed > (1.0_wp - shares(s))*total) exit
+      end do
+      x(s) = particles%x(order(max(k, 1)))
+    end do
+  end function mass_front
+
+  !> Depth of the deposit at its initial density in each column of cells, in m: [columns].
+  !> A point counts in the column of its centre; one outside all columns counts nowhere.
+  pure function deposit_depth(particles, materials, x_min, column_width, columns) result(depth)
+    type(particles_t), intent(in) :: particles
+    type(material_t), intent(in) :: materials(:)
+    real(wp), intent(in) :: x_min, column_width
+    integer, intent(in) :: columns
+    real(sp) :: depth(columns)
+    real(wp) :: total(columns), density
+    integer :: body, p, k
+
+    total = 0.0_wp
+    do body = 1, size(particles%bodies)
+      density = materials(particles%bodies(body)%material)%density
+      do p = particles%bodies(body)%first, particles%bodies(body)%last
+        k = floor((particles%x(p) - x_min)/column_width) + 1
+        if (k >= 1 .and. k <= columns) total(k) = total(k) + particles%mass(p)/(density*column_width)
+      end do
+    end do
+    depth = real(total, sp)
+  end function deposit_depth
+
+  !> End of the deposit still joined to the main body, in m: walking from the column of `source_x` along x, the right
+  !> end of the last column before the depth falls below `least_depth`.
+  pure function connected_front(depth, x_min, column_width, source_x, least_depth) result(x)
+    real(sp), intent(in) :: depth(:)
+    real(wp), intent(in) :: x_min, column_width, source_x, least_depth
+    real(wp) :: x
+    integer :: k, first
+
+    first = min(max(floor((source_x - x_min)/column_width) + 1, 1), size(depth))
+    do k = first, size(depth)
+      ! A part in 1e5 for the single precision of the depth.
+      if (depth(k) < least_depth*(1.0_wp - 1.0e-5_wp)) exit
+    end do
+    x = x_min + (k - 1)*column_width
+  end function connected_front
+
+  !> Highest edge of the points whose centre lies between `x_first` and `x_last`, in m; `y_base` if there is none.
+  pure function surface_height(particles, x_first, x_last, y_base) result(y)
+    type(particles_t), intent(in) :: particles
+    real(wp), intent(in) :: x_first, x_last, y_base
+    real(wp) :: y
+    integer :: body
+
+    y = y_base
+    do body = 1, size(particles%bodies)
+      associate (b => particles%bodies(body))
+        y = max(y, 0.5_wp*b%height + maxval(particles%y(b%first:b%last), &
+                mask=particles%x(b%first:b%last) >= x_first .and. particles%x(b%first:b%last) <= x_last))
+      end associate
+    end do
+  end function surface_height
+
+  !> Elastic energy of the stresses, sum of V/2 s : C^-1 : s, in J/m.
+  pure function elastic_energy(particles, materials) result(energy)
+    type(particles_t), intent(in) :: particles
+    type(material_t), intent(in) :: materials(:)
+    real(wp) :: energy, trace
+    integer :: body, p
+
+    energy = 0.0_wp
+    do body = 1, size(particles%bodies)
+      associate (s => particles, material => materials(particles%bodies(body)%material))
+        do p = particles%bodies(body)%first, particles%bodies(body)%last
+          trace = s%sxx(p) + s%syy(p) + s%szz(p)
+          energy = energy + s%volume(p)*(trace**2/(18.0_wp*material%bulk) &
+            + ((s%sxx(p) - trace/3.0_wp)**2 + (s%syy(p) - trace/3.0_wp)**2 + (s%szz(p) - trace/3.0_wp)**2 &
+            + 2.0_wp*s%sxy(p)**2)/(4.0_wp*material%shear))
+        end do
+      end associate
+    end do
+  end function elastic_energy
+
+  !> Potential energy in the field `gravity` (m/s^2) against the origin, in J/m.
+  pure function potential_energy(particles, gravity) result(energy)
+    type(particles_t), intent(in) :: particles
+    real(wp), intent(in) :: gravity(2)
+    real(wp) :: energy
+    energy = -sum(particles%mass*(gravity(1)*particles%x + gravity(2)*particles%y))
+  end function potential_energy
+
+  !> Angular momentum about the origin, in kg m/s.
+  pure function angular_momentum(particles) result(momentum)
+    type(particles_t), intent(in) :: particles
+    real(wp) :: momentum
+    momentum = sum(particles%mass*(particles%x*particles%vy - particles%y*particles%vx))
+  end function angular_momentum
+end module sg_runout

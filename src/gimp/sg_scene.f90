@@ -1,0 +1,163 @@
+!> A scene: everything that all members of an ensemble share. It is built once and never changes.
+module sg_scene
+  use sg_bodies, only: body_extent, fill_body, lattice_t
+  use sg_config, only: config_t
+  use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
+  use sg_initial_stress, only: set_geostatic_stress
+  use sg_kinds, only: wp
+  use sg_materials, only: create_material, material_t, MODEL_MOHR_COULOMB, mohr_coulomb_strength
+  use sg_particles, only: particles_t
+  implicit none
+  private
+
+  public :: scene_t, build_scene, set_friction_angle
+
+  type :: scene_t
+    type(material_t), allocatable :: materials(:)
+    !> Points at their first place with their first velocity and the stress of the ground, if any.
+    type(particles_t) :: particles
+    !> Position of the toe that runouts are measured from: the right end of the bodies, in m.
+    real(wp) :: toe
+    !> Extent of all bodies in m: x_min, x_max, y_min, y_max.
+    real(wp) :: extent(4)
+    !> Total mass in kg/m.
+    real(wp) :: mass
+    !> Fastest compression wave and largest initial speed, m/s.
+    real(wp) :: wave_speed, speed
+    !> Time step that the CFL number allows at the start, and fixed step (0: none), in s.
+    real(wp) :: first_step, fixed_step
+    !> Centres of the columns of cells, in m, [number of cells along x].
+    real(wp), allocatable :: profile_x(:)
+  end type scene_t
+
+contains
+
+  !> Builds the scene of a configuration that passed its checks. A body without a single point is an error.
+  subroutine build_scene(config, scene, error)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(out) :: scene
+    type(error_t), allocatable, intent(out) :: error
+    type(lattice_t), allocatable :: lattices(:)
+    integer :: k, count, columns
+
+    allocate (scene%materials(size(config%materials)), lattices(size(config%bodies)))
+    do k = 1, size(config%materials)
+      scene%materials(k) = create_material(config%materials(k))
+    end do
+    do k = 1, size(config%bodies)
+      call fill_body(config%bodies(k), config%grid%cell_size, lattices(k))
+      if (lattices(k)%count == 0) then
+        call raise(error, EXIT_BAD_INPUT, 'no material point lies in body '//trim(config%bodies(k)%name)// &
+                   '; it is smaller than the spacing of the points', 'build_scene')
+        return
+      end if
+    end do
+    count = sum(lattices%count)
+    call scene%particles%init(count, track_plastic_strain=.false.)
+    allocate (scene%particles%bodies(size(lattices)))
+    count = 0
+    do k = 1, size(lattices)
+      call place_body(config, lattices(k), k, count + 1, scene)
+      count = count + lattices(k)%count
+    end do
+    call set_strength(scene%materials, scene%particles)
+    call measure_scene(config, scene)
+    if (config%loading%initial_stress == 'geostatic') then
+      call set_geostatic_stress(scene%particles, scene%materials, config%loading%gravity)
+    end if
+    columns = nint((config%grid%x_max - config%grid%x_min)/config%grid%cell_size)
+    scene%profile_x = [(config%grid%x_min + (k - 0.5_wp)*config%grid%cell_size, k=1, columns)]
+  end subroutine build_scene
+
+  !> Puts the points of body `k` into the arrays from `first` on.
+  subroutine place_body(config, lattice, k, first, scene)
+    type(config_t), intent(in) :: config
+    type(lattice_t), intent(in) :: lattice
+    integer, intent(in) :: k, first
+    type(scene_t), intent(inout) :: scene
+    integer :: last, material
+
+    last = first + lattice%count - 1
+    material = config%bodies(k)%material_index
+    associate (p => scene%particles)
+      p%bodies(k)%first = first
+      p%bodies(k)%last = last
+      p%bodies(k)%material = material
+      p%bodies(k)%width = lattice%width
+      p%bodies(k)%height = lattice%height
+      p%x(first:last) = lattice%x
+      p%y(first:last) = lattice%y
+      p%x_start(first:last) = lattice%x
+      p%y_start(first:last) = lattice%y
+      p%vx(first:last) = config%bodies(k)%velocity(1)
+      p%vy(first:last) = config%bodies(k)%velocity(2)
+      p%volume(first:last) = lattice%width*lattice%height
+      p%mass(first:last) = lattice%width*lattice%height*scene%materials(material)%density
+      p%friction_angle(first:last) = scene%materials(material)%friction_angle
+    end associate
+  end subroutine place_body
+
+  !> Gives the points of `material` their friction angles, [number of such points in order], in degrees.
+  subroutine set_friction_angle(materials, material, friction_angle, particles)
+    type(material_t), intent(in) :: materials(:)
+    integer, intent(in) :: material
+    real(wp), intent(in) :: friction_angle(:)
+    type(particles_t), intent(inout) :: particles
+    integer :: body, done, count
+
+    done = 0
+    do body = 1, size(particles%bodies)
+      associate (b => particles%bodies(body))
+        if (b%material /= material) cycle
+        count = b%last - b%first + 1
+        particles%friction_angle(b%first:b%last) = friction_angle(done + 1:done + count)
+        done = done + count
+      end associate
+    end do
+    call set_strength(materials, particles)
+  end subroutine set_friction_angle
+
+  !> Strength of all Mohr-Coulomb points from their friction angle.
+  subroutine set_strength(materials, particles)
+    type(material_t), intent(in) :: materials(:)
+    type(particles_t), intent(inout) :: particles
+    integer :: body
+
+    do body = 1, size(particles%bodies)
+      associate (b => particles%bodies(body))
+        if (materials(b%material)%model /= MODEL_MOHR_COULOMB) cycle
+        call mohr_coulomb_strength(materials(b%material), particles%friction_angle(b%first:b%last), &
+                                   particles%sin_friction(b%first:b%last), particles%cohesion_term(b%first:b%last), &
+                                   particles%tension_limit(b%first:b%last))
+      end associate
+    end do
+  end subroutine set_strength
+
+  !> Extent, mass, speeds and the first time step.
+  subroutine measure_scene(config, scene)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(inout) :: scene
+    real(wp) :: box(4)
+    integer :: k
+
+    scene%extent = [huge(1.0_wp), -huge(1.0_wp), huge(1.0_wp), -huge(1.0_wp)]
+    scene%speed = 0.0_wp
+    scene%wave_speed = 0.0_wp
+    do k = 1, size(config%bodies)
+      box = body_extent(config%bodies(k))
+      scene%extent(1::2) = min(scene%extent(1::2), box(1::2))
+      scene%extent(2::2) = max(scene%extent(2::2), box(2::2))
+      scene%speed = max(scene%speed, norm2(config%bodies(k)%velocity))
+      associate (material => scene%materials(config%bodies(k)%material_index))
+        scene%wave_speed = max(scene%wave_speed, sqrt((material%lame + 2.0_wp*material%shear)/material%density))
+      end associate
+    end do
+    scene%toe = scene%extent(2)
+    scene%mass = sum(scene%particles%mass)
+    scene%fixed_step = config%solver%time_step
+    scene%first_step = scene%fixed_step
+    if (.not. scene%fixed_step > 0.0_wp) then
+      scene%first_step = config%solver%cfl*config%grid%cell_size/(scene%wave_speed + scene%speed)
+    end if
+  end subroutine measure_scene
+end module sg_scene
