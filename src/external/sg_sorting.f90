@@ -18,7 +18,8 @@ module sg_sorting
 
 contains
 
-  !> Positions (from 1) that bring `values` into rising order; the same values always give the same order.
+  !> Positions (from 1) that bring `values` into rising order; the same values always give the same
+  !> order.
   function sort_index(values) result(order)
     real(wp), intent(in) :: values(:)
     integer :: order(size(values))

@@ -32,8 +32,10 @@ contains
     end select
   end function body_extent
 
-  !> Points at the centres of the lattice cells whose centre lies in the body, x fastest. The lattice starts at the
-  !> lower left corner of the body's box; its spacing is `cell_size` over the points per cell, or a little less where
+  !> Points at the centres of the lattice cells whose centre lies in the body, x fastest. The
+  !> lattice starts at the
+  !> lower left corner of the body's box; its spacing is `cell_size` over the points per cell, or a
+  !> little less where
   !> the box is no multiple of it.
   pure subroutine fill_body(body, cell_size, lattice)
     type(body_config_t), intent(in) :: body
@@ -73,7 +75,8 @@ contains
     end function whole_number
   end subroutine fill_body
 
-  !> Is (x, y) in the body? For polygons by the number of edges crossed to the right (even-odd rule).
+  !> Is (x, y) in the body? For polygons by the number of edges crossed to the right (even-odd
+  !> rule).
   pure function is_inside(body, x, y) result(inside)
     type(body_config_t), intent(in) :: body
     real(wp), intent(in) :: x, y

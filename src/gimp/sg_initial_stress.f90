@@ -14,7 +14,8 @@ module sg_initial_stress
 contains
 
   !> s_yy = -(weight above in a column of the width of a point, and half the own weight)/width and
-  !> s_xx = s_zz = K0 s_yy with K0 = nu/(1 - nu). `gravity` in m/s^2 downwards (the configuration saw to that).
+  !> s_xx = s_zz = K0 s_yy with K0 = nu/(1 - nu). `gravity` in m/s^2 downwards (the configuration
+  !> saw to that).
   !> Bodies with points of different widths share columns of the largest width.
   subroutine set_geostatic_stress(particles, materials, gravity)
     type(particles_t), intent(inout) :: particles
@@ -46,7 +47,8 @@ contains
     end do
   end subroutine set_geostatic_stress
 
-  !> Returns every stress that violates the yield criterion of its point to the yield surface: K0 = 0.449 violates
+  !> Returns every stress that violates the yield criterion of its point to the yield surface: K0 =
+  !> 0.449 violates
   !> Mohr-Coulomb below 22.3 degrees.
   subroutine make_admissible(particles, materials)
     type(particles_t), intent(inout) :: particles
@@ -59,8 +61,10 @@ contains
         do first = b%first, b%last, BLOCK
           last = min(first + BLOCK - 1, b%last)
           call return_stress(last - first + 1, materials(b%material), p%sin_friction(first:last), &
-                             p%cohesion_term(first:last), p%tension_limit(first:last), p%sxx(first:last), &
-                             p%syy(first:last), p%szz(first:last), p%sxy(first:last), p%gap(first:last))
+                             p%cohesion_term(first:last), p%tension_limit(first:last), &
+                             p%sxx(first:last), &
+                             p%syy(first:last), p%szz(first:last), p%sxy(first:last), &
+                             p%gap(first:last))
         end do
       end associate
     end do

@@ -21,7 +21,8 @@ module sg_materials
     !> Lame's first constant, shear and bulk modulus, in Pa.
     real(wp) :: lame, shear, bulk
     real(wp) :: poisson
-    !> Mohr-Coulomb: friction angle in degrees, sine of the dilation angle, cohesion and tension strength in Pa.
+    !> Mohr-Coulomb: friction angle in degrees, sine of the dilation angle, cohesion and tension
+    !> strength in Pa.
     real(wp) :: friction_angle, sin_dilation, cohesion, tension_strength
   end type material_t
 
@@ -35,7 +36,8 @@ contains
     material%model = merge(MODEL_MOHR_COULOMB, MODEL_LINEAR_ELASTIC, config%model == 'mohr_coulomb')
     material%density = config%density
     material%poisson = config%poisson
-    material%lame = config%young*config%poisson/((1.0_wp + config%poisson)*(1.0_wp - 2.0_wp*config%poisson))
+    material%lame = config%young*config%poisson/((1.0_wp + config%poisson)*(1.0_wp &
+      - 2.0_wp*config%poisson))
     material%shear = config%young/(2.0_wp*(1.0_wp + config%poisson))
     material%bulk = material%lame + 2.0_wp/3.0_wp*material%shear
     material%friction_angle = 0.0_wp
@@ -50,9 +52,11 @@ contains
     end if
   end function create_material
 
-  !> Strength of a point with the friction angle `friction_angle` in degrees: sin(phi), 2 c cos(phi), and the
+  !> Strength of a point with the friction angle `friction_angle` in degrees: sin(phi), 2 c
+  !> cos(phi), and the
   !> largest tension, min(tension strength, c cot(phi)).
-  elemental subroutine mohr_coulomb_strength(material, friction_angle, sin_friction, cohesion_term, tension_limit)
+  elemental subroutine mohr_coulomb_strength(material, friction_angle, sin_friction, &
+    cohesion_term, tension_limit)
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: friction_angle
     real(wp), intent(out) :: sin_friction, cohesion_term, tension_limit

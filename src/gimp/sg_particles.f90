@@ -31,7 +31,8 @@ module sg_particles
     real(wp), allocatable :: sxx(:), syy(:), szz(:), sxy(:)
     !> Volumetric opening of a point that carries no stress, [count]; a strain >= 0.
     real(wp), allocatable :: gap(:)
-    !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the largest
+    !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the
+    !> largest
     !> principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
     real(wp), allocatable :: sin_friction(:), cohesion_term(:), tension_limit(:)
     !> Friction angle as it was given, [count], in degrees; for output only.
@@ -45,7 +46,8 @@ module sg_particles
 
 contains
 
-  !> All arrays at the length `count` and zero; `track_plastic_strain` also keeps the plastic strain.
+  !> All arrays at the length `count` and zero; `track_plastic_strain` also keeps the plastic
+  !> strain.
   subroutine init_particles(this, count, track_plastic_strain)
     class(particles_t), intent(out) :: this
     integer, intent(in) :: count

@@ -1,4 +1,5 @@
-!> What is measured on a state of the points: runout by four definitions, heights, profile, energies.
+!> What is measured on a state of the points: runout by four definitions, heights, profile,
+!> energies.
 !> Runouts are measured from the initial toe of the bodies, in m, towards +x.
 module sg_runout
   use sg_kinds, only: sp, wp
@@ -27,7 +28,8 @@ contains
     end do
   end function farthest_edge
 
-  !> Positions behind which the given shares of the mass lie, in m: the centre of the point at which the mass
+  !> Positions behind which the given shares of the mass lie, in m: the centre of the point at
+  !> which the mass
   !> summed from the right passes the rest.
   function mass_front(particles, shares) result(x)
     type(particles_t), intent(in) :: particles
@@ -65,13 +67,15 @@ contains
       density = materials(particles%bodies(body)%material)%density
       do p = particles%bodies(body)%first, particles%bodies(body)%last
         k = floor((particles%x(p) - x_min)/column_width) + 1
-        if (k >= 1 .and. k <= columns) total(k) = total(k) + particles%mass(p)/(density*column_width)
+        if (k >= 1 .and. k <= columns) total(k) = total(k) &
+          + particles%mass(p)/(density*column_width)
       end do
     end do
     depth = real(total, sp)
   end function deposit_depth
 
-  !> End of the deposit still joined to the main body, in m: walking from the column of `source_x` along x, the right
+  !> End of the deposit still joined to the main body, in m: walking from the column of `source_x`
+  !> along x, the right
   !> end of the last column before the depth falls below `least_depth`.
   pure function connected_front(depth, x_min, column_width, source_x, least_depth) result(x)
     real(sp), intent(in) :: depth(:)
@@ -87,7 +91,8 @@ contains
     x = x_min + (k - 1)*column_width
   end function connected_front
 
-  !> Highest edge of the points whose centre lies between `x_first` and `x_last`, in m; `y_base` if there is none.
+  !> Highest edge of the points whose centre lies between `x_first` and `x_last`, in m; `y_base` if
+  !> there is none.
   pure function surface_height(particles, x_first, x_last, y_base) result(y)
     type(particles_t), intent(in) :: particles
     real(wp), intent(in) :: x_first, x_last, y_base
@@ -98,7 +103,8 @@ contains
     do body = 1, size(particles%bodies)
       associate (b => particles%bodies(body))
         y = max(y, 0.5_wp*b%height + maxval(particles%y(b%first:b%last), &
-                mask=particles%x(b%first:b%last) >= x_first .and. particles%x(b%first:b%last) <= x_last))
+                mask=particles%x(b%first:b%last) >= x_first &
+                .and. particles%x(b%first:b%last) <= x_last))
       end associate
     end do
   end function surface_height
@@ -116,7 +122,8 @@ contains
         do p = particles%bodies(body)%first, particles%bodies(body)%last
           trace = s%sxx(p) + s%syy(p) + s%szz(p)
           energy = energy + s%volume(p)*(trace**2/(18.0_wp*material%bulk) &
-            + ((s%sxx(p) - trace/3.0_wp)**2 + (s%syy(p) - trace/3.0_wp)**2 + (s%szz(p) - trace/3.0_wp)**2 &
+            + ((s%sxx(p) - trace/3.0_wp)**2 + (s%syy(p) - trace/3.0_wp)**2 + (s%szz(p) &
+            - trace/3.0_wp)**2 &
             + 2.0_wp*s%sxy(p)**2)/(4.0_wp*material%shear))
         end do
       end associate

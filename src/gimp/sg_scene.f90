@@ -32,7 +32,8 @@ module sg_scene
 
 contains
 
-  !> Builds the scene of a configuration that passed its checks. A body without a single point is an error.
+  !> Builds the scene of a configuration that passed its checks. A body without a single point is
+  !> an error.
   subroutine build_scene(config, scene, error)
     type(config_t), intent(in) :: config
     type(scene_t), intent(out) :: scene
@@ -47,7 +48,8 @@ contains
     do k = 1, size(config%bodies)
       call fill_body(config%bodies(k), config%grid%cell_size, lattices(k))
       if (lattices(k)%count == 0) then
-        call raise(error, EXIT_BAD_INPUT, 'no material point lies in body '//trim(config%bodies(k)%name)// &
+        call raise(error, EXIT_BAD_INPUT, &
+          'no material point lies in body '//trim(config%bodies(k)%name)// &
                    '; it is smaller than the spacing of the points', 'build_scene')
         return
       end if
@@ -97,7 +99,8 @@ contains
     end associate
   end subroutine place_body
 
-  !> Gives the points of `material` their friction angles, [number of such points in order], in degrees.
+  !> Gives the points of `material` their friction angles, [number of such points in order], in
+  !> degrees.
   subroutine set_friction_angle(materials, material, friction_angle, particles)
     type(material_t), intent(in) :: materials(:)
     integer, intent(in) :: material
@@ -126,8 +129,10 @@ contains
     do body = 1, size(particles%bodies)
       associate (b => particles%bodies(body))
         if (materials(b%material)%model /= MODEL_MOHR_COULOMB) cycle
-        call mohr_coulomb_strength(materials(b%material), particles%friction_angle(b%first:b%last), &
-                                   particles%sin_friction(b%first:b%last), particles%cohesion_term(b%first:b%last), &
+        call mohr_coulomb_strength(materials(b%material), &
+          particles%friction_angle(b%first:b%last), &
+                                   particles%sin_friction(b%first:b%last), &
+                                   particles%cohesion_term(b%first:b%last), &
                                    particles%tension_limit(b%first:b%last))
       end associate
     end do
@@ -149,7 +154,8 @@ contains
       scene%extent(2::2) = max(scene%extent(2::2), box(2::2))
       scene%speed = max(scene%speed, norm2(config%bodies(k)%velocity))
       associate (material => scene%materials(config%bodies(k)%material_index))
-        scene%wave_speed = max(scene%wave_speed, sqrt((material%lame + 2.0_wp*material%shear)/material%density))
+        scene%wave_speed = max(scene%wave_speed, sqrt((material%lame &
+          + 2.0_wp*material%shear)/material%density))
       end associate
     end do
     scene%toe = scene%extent(2)

@@ -1,4 +1,5 @@
-!> One member from its initial state to rest: the time loop, the end conditions, the failures, the measures.
+!> One member from its initial state to rest: the time loop, the end conditions, the failures, the
+!> measures.
 module sg_simulation
   use sg_config, only: config_t
   use sg_kinds, only: sp, wp
@@ -7,7 +8,8 @@ module sg_simulation
   use sg_observer, only: history_row_t, observer_t
   use sg_outcome
   use sg_particles, only: copy_particles
-  use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, farthest_edge, &
+  use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
+    farthest_edge, &
     mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle
   use sg_solver, only: solver_t
@@ -18,15 +20,18 @@ module sg_simulation
 
   public :: simulate, variation_t
 
-  !> How a member differs from the scene. The defaults change nothing; the homogeneous members of a study use the
+  !> How a member differs from the scene. The defaults change nothing; the homogeneous members of a
+  !> study use the
   !> others for changes that mean nothing physically.
   type :: variation_t
     !> Factor on the CFL number or on the fixed step.
     real(wp) :: step_factor = 1.0_wp
-    !> Relative growth of the cells about the lower left corner. Walls must stay on lines of nodes, so the lines
+    !> Relative growth of the cells about the lower left corner. Walls must stay on lines of nodes,
+    !> so the lines
     !> inside the body are shifted by stretching: by a whole cell at the toe for cell_size/width.
     real(wp) :: cell_stretch = 0.0_wp
-    !> Friction angles of the points of one material, in degrees; not allocated: as the material says.
+    !> Friction angles of the points of one material, in degrees; not allocated: as the material
+    !> says.
     real(wp), allocatable :: friction_angle(:)
     integer :: material = 0
   end type variation_t
@@ -35,10 +40,12 @@ module sg_simulation
   integer, parameter :: POINTS_PER_QUESTION = 100000
   !> A step below this share of the first one counts as collapsed.
   real(wp), parameter :: COLLAPSED_STEP = 1.0e-4_wp
-  !> A speed this many times above all that the scene can explain (wave speed, fall through the domain, initial
+  !> A speed this many times above all that the scene can explain (wave speed, fall through the
+  !> domain, initial
   !> speed) counts as runaway.
   real(wp), parameter :: RUNAWAY_FACTOR = 10.0_wp
-  !> "Stays below": for one fundamental period of the body, 4 H/c, so that the turning points of an elastic
+  !> "Stays below": for one fundamental period of the body, 4 H/c, so that the turning points of an
+  !> elastic
   !> oscillation do not pass for rest.
   real(wp), parameter :: SETTLE_PERIODS = 1.0_wp
 
@@ -46,7 +53,8 @@ module sg_simulation
   type :: clock_t
     integer :: step = 0
     real(wp) :: time = 0.0_wp, time_step = 0.0_wp
-    real(wp) :: peak_energy = 0.0_wp, calm_since = 0.0_wp, calm_needed = 0.0_wp, speed_limit = 0.0_wp
+    real(wp) :: peak_energy = 0.0_wp, calm_since = 0.0_wp, calm_needed = 0.0_wp, &
+      speed_limit = 0.0_wp
     real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
     real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp
     logical :: settled = .false.
@@ -54,7 +62,8 @@ module sg_simulation
 
 contains
 
-  !> Runs one member. `outcome` comes reset and named; a failure is a status in it, never an error. Asked to abandon,
+  !> Runs one member. `outcome` comes reset and named; a failure is a status in it, never an error.
+  !> Asked to abandon,
   !> it returns with STATUS_ABANDONED.
   subroutine simulate(config, scene, variation, monitor, observer, outcome)
     type(config_t), intent(in) :: config
@@ -104,9 +113,11 @@ contains
     solver%materials = scene%materials
     call copy_particles(scene%particles, observer%wants_plastic_strain, solver%particles)
     if (allocated(variation%friction_angle)) then
-      call set_friction_angle(solver%materials, variation%material, variation%friction_angle, solver%particles)
+      call set_friction_angle(solver%materials, variation%material, variation%friction_angle, &
+        solver%particles)
     end if
-    if (config%loading%initial_stress == 'geostatic') call make_admissible(solver%particles, solver%materials)
+    if (config%loading%initial_stress == 'geostatic') call make_admissible(solver%particles, &
+      solver%materials)
     call solver%configure(config)
     call solver%grid%init(config%grid, variation%cell_stretch, minval(solver%particles%mass))
     call solver%start()
@@ -120,7 +131,8 @@ contains
     real(wp) :: fall
 
     clock%peak_energy = solver%tally%kinetic_energy
-    clock%calm_needed = SETTLE_PERIODS*4.0_wp*max(scene%extent(2) - scene%extent(1), scene%extent(4) - scene%extent(3)) &
+    clock%calm_needed = SETTLE_PERIODS*4.0_wp*max(scene%extent(2) - scene%extent(1), &
+      scene%extent(4) - scene%extent(3)) &
       /scene%wave_speed
     fall = norm2(config%loading%gravity) &
       *(config%grid%x_max - config%grid%x_min + config%grid%y_max - config%grid%y_min)
@@ -141,14 +153,16 @@ contains
     if (scene%fixed_step > 0.0_wp) then
       time_step = scene%fixed_step
     else
-      ! Points that all float free carry no stress and have no wave speed: then that of the scene holds.
+      ! Points that all float free carry no stress and have no wave speed: then that of the scene
+      ! holds.
       time_step = config%solver%cfl*solver%grid%cell_size/(sqrt(solver%tally%speed_squared) &
         + max(sqrt(solver%tally%wave_squared), 0.5_wp*scene%wave_speed))
     end if
     time_step = min(time_step*variation%step_factor, config%solver%end_time - clock%time)
   end function next_step
 
-  !> Looks for what has no cure: a state that is not finite, a point outside, a runaway speed, a collapsing step.
+  !> Looks for what has no cure: a state that is not finite, a point outside, a runaway speed, a
+  !> collapsing step.
   !> All is read off the tally of the step; only a failure costs a search.
   subroutine check_step(config, scene, variation, solver, clock, outcome)
     type(config_t), intent(in) :: config
@@ -160,23 +174,32 @@ contains
     real(wp) :: x_last, y_last
     integer :: p
 
-    x_last = config%grid%x_min + (config%grid%x_max - config%grid%x_min)*(1.0_wp + variation%cell_stretch)
-    y_last = config%grid%y_min + (config%grid%y_max - config%grid%y_min)*(1.0_wp + variation%cell_stretch)
+    x_last = config%grid%x_min + (config%grid%x_max - config%grid%x_min)*(1.0_wp &
+      + variation%cell_stretch)
+    y_last = config%grid%y_min + (config%grid%y_max - config%grid%y_min)*(1.0_wp &
+      + variation%cell_stretch)
     associate (t => solver%tally, s => solver%particles)
-      if (.not. abs(t%kinetic_energy) <= huge(1.0_wp) .or. .not. abs(t%internal_work) <= huge(1.0_wp)) then
-        p = minloc(merge(0, 1, .not. abs(s%vx + s%vy + s%sxx + s%syy + s%szz + s%sxy) <= huge(1.0_wp)), dim=1)
-        call fail(STATUS_NOT_FINITE, p, 'velocity or stress is not a finite number: the time step is too long or '// &
+      if (.not. abs(t%kinetic_energy) <= huge(1.0_wp) &
+        .or. .not. abs(t%internal_work) <= huge(1.0_wp)) then
+        p = minloc(merge(0, 1, .not. abs(s%vx + s%vy + s%sxx + s%syy + s%szz &
+          + s%sxy) <= huge(1.0_wp)), dim=1)
+        call fail(STATUS_NOT_FINITE, p, &
+          'velocity or stress is not a finite number: the time step is too long or '// &
                   'the material too soft for its load')
       else if (t%x_min < config%grid%x_min .or. t%x_max > x_last .or. t%y_min < config%grid%y_min &
                .or. t%y_max > y_last) then
-        p = minloc(merge(0, 1, s%x < config%grid%x_min .or. s%x > x_last .or. s%y < config%grid%y_min &
+        p = minloc(merge(0, 1, s%x < config%grid%x_min .or. s%x > x_last &
+          .or. s%y < config%grid%y_min &
                          .or. s%y > y_last), dim=1)
-        call fail(STATUS_POINT_LOST, p, 'point left the grid: make the grid larger or close the wall')
+        call fail(STATUS_POINT_LOST, p, &
+          'point left the grid: make the grid larger or close the wall')
       else if (t%speed_squared > clock%speed_limit**2) then
         p = maxloc(s%vx**2 + s%vy**2, dim=1)
-        call fail(STATUS_RUNAWAY, p, 'speed of '//to_text(sqrt(t%speed_squared), 4)//' m/s is above all that the '// &
+        call fail(STATUS_RUNAWAY, p, 'speed of '//to_text(sqrt(t%speed_squared), &
+          4)//' m/s is above all that the '// &
                   'scene can explain: the time step is too long')
-      else if (clock%time_step < COLLAPSED_STEP*scene%first_step .and. clock%time < config%solver%end_time) then
+      else if (clock%time_step < COLLAPSED_STEP*scene%first_step &
+        .and. clock%time < config%solver%end_time) then
         p = maxloc(s%volume/s%mass, dim=1)
         call fail(STATUS_STEP_COLLAPSE, p, 'time step fell to '//to_text(clock%time_step, 4)//' s')
       end if
@@ -223,7 +246,8 @@ contains
       outcome%status = STATUS_ABANDONED
     case (OUT_OF_TIME)
       outcome%status = STATUS_TIME_LIMIT
-      outcome%reason = 'wall clock limit of a member reached at '//to_text(clock%time, 4)//' s of simulated time'
+      outcome%reason = 'wall clock limit of a member reached at '//to_text(clock%time, &
+        4)//' s of simulated time'
       outcome%values(FAILURE_STEP) = clock%step
     end select
   end subroutine ask_monitor
@@ -237,13 +261,15 @@ contains
 
     if (observer%history_interval > 0.0_wp .and. clock%time >= clock%next_history) then
       call observer%note_history(history_row(config, solver, clock))
-      clock%next_history = (floor(clock%time/observer%history_interval) + 1)*observer%history_interval
+      clock%next_history = (floor(clock%time/observer%history_interval) &
+        + 1)*observer%history_interval
     end if
     if (observer%snapshot_interval > 0.0_wp .and. clock%time >= clock%next_snapshot) then
       if (.not. (observer%wants_ends .and. clock%step == 0)) then
         call observer%note_state(clock%step, clock%time, solver%particles)
       end if
-      clock%next_snapshot = (floor(clock%time/observer%snapshot_interval) + 1)*observer%snapshot_interval
+      clock%next_snapshot = (floor(clock%time/observer%snapshot_interval) &
+        + 1)*observer%snapshot_interval
     end if
   end subroutine watch
 
@@ -289,7 +315,8 @@ contains
       outcome%height = deposit_depth(s, scene%materials, g%x_min, cell, size(scene%profile_x))
       ! Half the height of a point, spread over a column of cells.
       point_depth = minval(s%bodies%width*s%bodies%height)/cell
-      v(RUNOUT_CONNECTED) = connected_front(outcome%height, g%x_min, cell, scene%extent(1) + 0.5_wp*cell, &
+      v(RUNOUT_CONNECTED) = connected_front(outcome%height, g%x_min, cell, scene%extent(1) &
+        + 0.5_wp*cell, &
                                             point_depth) - scene%toe
       v(HEIGHT_MAX) = surface_height(s, -huge(1.0_wp), huge(1.0_wp), g%y_min) - g%y_min
       v(HEIGHT_WALL) = surface_height(s, scene%extent(1), scene%extent(1) + cell, g%y_min) - g%y_min
@@ -302,7 +329,8 @@ contains
       v(WALL_TOUCHED) = merge(1.0_wp, 0.0_wp, touched)
       potential = potential_energy(s, config%loading%gravity)
       scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, tiny(1.0_wp))
-      v(ENERGY_ERROR) = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
+      v(ENERGY_ERROR) = (solver%tally%kinetic_energy + potential + solver%internal_work &
+        + solver%damping_work &
         - clock%energy_at_start)/scale
       v(MASS_ERROR) = sum(s%mass)/scene%mass - 1.0_wp
       v(FIELD_MEAN) = sum(s%friction_angle)/s%count

@@ -1,8 +1,11 @@
-!> One explicit step of the material point method, for the three orders in which stresses can be updated.
+!> One explicit step of the material point method, for the three orders in which stresses can be
+!> updated.
 !>
-!>   usl   momentum first, stress last: both with the grid of the step. One sweep over the points serves the end of
+!>   usl   momentum first, stress last: both with the grid of the step. One sweep over the points
+!> serves the end of
 !>         one step and the start of the next.
-!>   musl  as usl, but strains follow from the velocity mapped back from the updated points (Sulsky et al. 1995).
+!>   musl  as usl, but strains follow from the velocity mapped back from the updated points (Sulsky
+!> et al. 1995).
 !>   usf   stress first, from the velocity at the start of the step (Bardenhagen 2002).
 !>
 !> All are made of the same sweep with other parts of it switched on.
@@ -16,7 +19,8 @@ module sg_solver
   use sg_particles, only: body_points_t, particles_t
   use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_force, map_momentum, &
     map_momentum_and_force
-  use sg_weighting, only: axis_weights_interface, BLOCK, gimp_axis_weights, linear_axis_weights, weights_t
+  use sg_weighting, only: axis_weights_interface, BLOCK, gimp_axis_weights, linear_axis_weights, &
+    weights_t
   implicit none
   private
 
@@ -92,7 +96,8 @@ contains
 
     this%internal_work = 0.0_wp
     this%damping_work = 0.0_wp
-    call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), 0.0_wp)
+    call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
+      0.0_wp)
     call note_all(this)
     call this%grid%set_window(this%tally)
   end subroutine start
@@ -138,13 +143,15 @@ contains
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, damping_work)
       call this%sweep_points(sweep_t(update_velocity=.true., map_momentum=.true.), time_step)
       call this%grid%remap_velocity()
-      call this%sweep_points(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., map_force=.true.), &
+      call this%sweep_points(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
+        map_force=.true.), &
                              time_step)
     case (SCHEME_USF)
       call this%grid%find_velocity()
       call this%sweep_points(sweep_t(update_stress=.true., map_force=.true.), time_step)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, damping_work)
-      call this%sweep_points(sweep_t(update_velocity=.true., move_with=3, map_momentum=.true.), time_step)
+      call this%sweep_points(sweep_t(update_velocity=.true., move_with=3, map_momentum=.true.), &
+        time_step)
     end select
     this%damping_work = this%damping_work + damping_work
     this%internal_work = this%internal_work + this%tally%internal_work
@@ -181,9 +188,10 @@ contains
     associate (p => this%particles, g => this%grid)
       call this%find_weights(body, first, last, w)
       if (sweep%update_stress) then
-        call gather_motion_and_gradient(n, w, g%nx, g%ny, g%motion, value, gradient)
+        call gather_motion_and_gradient(n, w, g%nx, g%ny, g%motion_store(g%motion_start), value, &
+          gradient)
       else if (sweep%update_velocity) then
-        call gather_motion(n, w, g%nx, g%ny, g%motion, value)
+        call gather_motion(n, w, g%nx, g%ny, g%motion_store(g%motion_start), value)
       end if
       if (sweep%update_velocity) then
         call update_velocity(n, this%flip, value, p%vx(first:last), p%vy(first:last))
@@ -197,12 +205,13 @@ contains
       if (sweep%map_momentum .and. sweep%map_force) then
         call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
                                     p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-                                    p%sxy(first:last), g%nx, g%ny, g%total)
+                                    p%sxy(first:last), g%nx, g%ny, g%total_store(g%total_start))
       else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), g%nx, g%ny, g%total)
+        call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), g%nx, &
+          g%ny, g%total_store(g%total_start))
       else if (sweep%map_force) then
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-                       p%sxy(first:last), g%nx, g%ny, g%total)
+                       p%sxy(first:last), g%nx, g%ny, g%total_store(g%total_start))
       end if
     end associate
   end subroutine sweep_block
@@ -217,9 +226,11 @@ contains
 
     n = last - first + 1
     associate (p => this%particles, g => this%grid)
-      call this%axis_weights(n, p%x(first:last), g%x_origin, g%inverse_cell, body%width*g%inverse_cell, &
+      call this%axis_weights(n, p%x(first:last), g%x_origin, g%inverse_cell, &
+        body%width*g%inverse_cell, &
                              g%last_base_x, w%i, w%sx, w%gx)
-      call this%axis_weights(n, p%y(first:last), g%y_origin, g%inverse_cell, body%height*g%inverse_cell, &
+      call this%axis_weights(n, p%y(first:last), g%y_origin, g%inverse_cell, &
+        body%height*g%inverse_cell, &
                              g%last_base_y, w%j, w%sy, w%gy)
     end associate
   end subroutine find_weights
@@ -238,10 +249,12 @@ contains
     n = last - first + 1
     associate (p => this%particles, material => this%materials(body%material))
       call find_strain(n, time_step, gradient, strain)
-      work = stress_power(n, strain, p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%sxy(first:last))
+      work = stress_power(n, strain, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
+        p%sxy(first:last))
       call update_volume(n, strain, p%volume(first:last))
       if (material%model == MODEL_MOHR_COULOMB) call close_gap(n, strain, p%gap(first:last))
-      call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), p%syy(first:last), &
+      call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), &
+        p%syy(first:last), &
                           p%szz(first:last), p%sxy(first:last))
       if (material%model == MODEL_MOHR_COULOMB) then
         if (p%has_plastic_strain()) then
@@ -255,14 +268,17 @@ contains
                            p%szz(first:last), p%sxy(first:last), p%gap(first:last))
         if (p%has_plastic_strain()) then
           call add_plastic_strain(n, material%shear, trial, p%sxx(first:last), p%syy(first:last), &
-                                  p%szz(first:last), p%sxy(first:last), p%plastic_strain(first:last))
+                                  p%szz(first:last), p%sxy(first:last), &
+                                  p%plastic_strain(first:last))
         end if
       end if
-      work = work + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
+      work = work + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
+        p%syy(first:last), &
                                  p%sxy(first:last))
       this%tally%internal_work = this%tally%internal_work + 0.5_wp*work
       this%tally%wave_squared = max(this%tally%wave_squared, largest_wave_speed( &
-        n, material%lame + 2.0_wp*material%shear, p%volume(first:last), p%mass(first:last), p%gap(first:last)))
+        n, material%lame + 2.0_wp*material%shear, p%volume(first:last), p%mass(first:last), &
+        p%gap(first:last)))
     end associate
   end subroutine strain_block
 
@@ -337,7 +353,8 @@ contains
     speed_squared = this%tally%speed_squared
     associate (x => this%particles%x, y => this%particles%y, vx => this%particles%vx, &
                vy => this%particles%vy, mass => this%particles%mass)
-      !$omp simd private(squared) reduction(min:x_min, y_min) reduction(max:x_max, y_max, speed_squared) &
+      !$omp simd private(squared) reduction(min:x_min, y_min) reduction(max:x_max, y_max, &
+      !$omp& speed_squared) &
       !$omp& reduction(+:energy)
       do p = first, last
         x_min = min(x_min, x(p))

@@ -1,9 +1,12 @@
 !> Weighting functions S_ip and their slopes, one axis at a time; the 2-D function is the product.
 !>
-!> All kinds share one stencil of three nodes an axis, counted from `base`, so that one transfer kernel serves
-!> them all. Node k (from 0) lies at `origin + k h`. Lengths below are in cells: xi = (x - origin)/h.
+!> All kinds share one stencil of three nodes an axis, counted from `base`, so that one transfer
+!> kernel serves
+!> them all. Node k (from 0) lies at `origin + k h`. Lengths below are in cells: xi = (x -
+!> origin)/h.
 !>
-!> uGIMP (Bardenhagen & Kober 2004; closed form without branches), w = width of the point in cells, 0 < w <= 1:
+!> uGIMP (Bardenhagen & Kober 2004; closed form without branches), w = width of the point in cells,
+!> 0 < w <= 1:
 !>   base = floor(xi - w/2), f = xi - w/2 - base, u = max(0, f + w - 1), d = max(0, 1 - f - w)
 !>   S_0 = ((1-f)^2 - d^2)/(2w),  S_2 = u^2/(2w),  S_1 = 1 - S_0 - S_2
 !>   S_2' = u/(w h),  S_0' = S_2' - 1/h,  S_1' = -(S_0' + S_2')
@@ -16,7 +19,8 @@ module sg_weighting
   public :: weights_t, axis_weights_interface, BLOCK
   public :: gimp_axis_weights, linear_axis_weights
 
-  !> Points that a kernel handles at a time: long enough to fill vector units, short enough for the first cache.
+  !> Points that a kernel handles at a time: long enough to fill vector units, short enough for the
+  !> first cache.
   integer, parameter :: BLOCK = 64
 
   !> Weights of up to BLOCK points.
@@ -28,7 +32,8 @@ module sg_weighting
   end type weights_t
 
   abstract interface
-    !> Weights of `n` points along one axis. `last_base` is the largest allowed first node: a point outside the
+    !> Weights of `n` points along one axis. `last_base` is the largest allowed first node: a point
+    !> outside the
     !> grid is held inside, so that no array is overrun before the end of the step reports it lost.
     pure subroutine axis_weights_interface(n, x, origin, inverse_cell, width, last_base, base, s, g)
       import :: wp, BLOCK

@@ -1,8 +1,12 @@
-!> Isotropic linear elasticity in rate form with the Jaumann rate, and the kinematics all materials share.
+!> Isotropic linear elasticity in rate form with the Jaumann rate, and the kinematics all materials
+!> share.
 !>
-!> Per step, with L the velocity gradient: strain increment = sym(L) dt, rotation angle w = (L_yx - L_xy) dt/2.
-!> Stress is turned by the rotation in the Cayley (midpoint) form, tan(theta) = w for half the angle of
-!> the stress deviator, orthogonal to rounding (Hughes & Winget 1980), and then takes the elastic increment.
+!> Per step, with L the velocity gradient: strain increment = sym(L) dt, rotation angle w = (L_yx -
+!> L_xy) dt/2.
+!> Stress is turned by the rotation in the Cayley (midpoint) form, tan(theta) = w for half the
+!> angle of
+!> the stress deviator, orthogonal to rounding (Hughes & Winget 1980), and then takes the elastic
+!> increment.
 module sg_linear_elastic
   use sg_kinds, only: wp
   use sg_weighting, only: BLOCK
@@ -11,7 +15,8 @@ module sg_linear_elastic
 
   public :: strain_t, find_strain, update_volume, predict_stress, stress_power
 
-  !> Strain increments of up to BLOCK points; exy is the tensor component, `share` the part of the increment that
+  !> Strain increments of up to BLOCK points; exy is the tensor component, `share` the part of the
+  !> increment that
   !> strains the material (below 1 only for a point that first has a gap to close).
   type :: strain_t
     real(wp) :: exx(BLOCK), eyy(BLOCK), exy(BLOCK), spin(BLOCK), share(BLOCK)
@@ -93,7 +98,8 @@ contains
     work = 0.0_wp
     !$omp simd reduction(+:work)
     do p = 1, n
-      work = work + volume(p)*(sxx(p)*strain%exx(p) + syy(p)*strain%eyy(p) + 2.0_wp*sxy(p)*strain%exy(p))
+      work = work + volume(p)*(sxx(p)*strain%exx(p) + syy(p)*strain%eyy(p) &
+        + 2.0_wp*sxy(p)*strain%exy(p))
     end do
   end function stress_power
 end module sg_linear_elastic

@@ -1,14 +1,21 @@
-!> Mohr-Coulomb plasticity with tension cut-off: exact return in principal stresses, and the gap of separated points.
+!> Mohr-Coulomb plasticity with tension cut-off: exact return in principal stresses, and the gap of
+!> separated points.
 !>
-!> Sorted principal stresses s1 >= s2 >= s3, tension positive; the out-of-plane stress may be any of them.
-!>   yield    f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0,  s1 <= T = min(tension strength, c cot(phi))
+!> Sorted principal stresses s1 >= s2 >= s3, tension positive; the out-of-plane stress may be any
+!> of them.
+!>   yield    f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0,  s1 <= T = min(tension
+!> strength, c cot(phi))
 !>   flow     g = (s1 - s3) + (s1 + s3) sin(psi) on the cone, associated on the cut-off
 !>   return   s = s_trial - sum_k lambda_k D dg_k/ds over the active planes, lambda_k >= 0 (Koiter)
-!> Planes are linear in principal stress, so each set of active planes is a small linear system and the return is
-!> exact: plane, two edges (s2 = s3 and s1 = s2), the cut-off with its edges and corners, the apex s1 = s2 = s3 = T.
+!> Planes are linear in principal stress, so each set of active planes is a small linear system and
+!> the return is
+!> exact: plane, two edges (s2 = s3 and s1 = s2), the cut-off with its edges and corners, the apex
+!> s1 = s2 = s3 = T.
 !>
-!> Gap: at the apex the volumetric strain that makes no stress is kept as `gap` >= 0. While it is open the point
-!> stays at the apex; compression closes the gap first, and only the rest of the increment builds stress. Without
+!> Gap: at the apex the volumetric strain that makes no stress is kept as `gap` >= 0. While it is
+!> open the point
+!> stays at the apex; compression closes the gap first, and only the rest of the increment builds
+!> stress. Without
 !> it a grain that flew off would come back with several times its volume and full stiffness.
 module sg_mohr_coulomb
   use sg_kinds, only: wp
@@ -28,29 +35,37 @@ module sg_mohr_coulomb
   integer, parameter :: REGION_CUT_OFF = 3
   integer, parameter :: REGION_APEX = 4
 
-  !> Planes: 1 the cone between s1 and s3, 2 between s1 and s2, 3 between s2 and s3, 4 to 6 the cut-offs of s1, s2, s3.
-  !> Sets of active planes in the order they are tried; those from the 4th on need a cut-off below the apex.
+  !> Planes: 1 the cone between s1 and s3, 2 between s1 and s2, 3 between s2 and s3, 4 to 6 the
+  !> cut-offs of s1, s2, s3.
+  !> Sets of active planes in the order they are tried; those from the 4th on need a cut-off below
+  !> the apex.
   integer, parameter :: SET_COUNT = 10
   integer, parameter :: CONE_SET_COUNT = 3
   integer, parameter :: ACTIVE(3, SET_COUNT) = reshape([ &
     1, 0, 0, 1, 2, 0, 1, 3, 0, &
     4, 0, 0, 1, 4, 0, 4, 5, 0, 1, 2, 4, 1, 3, 4, 1, 4, 5, 3, 4, 5], [3, SET_COUNT])
   integer, parameter :: SET_REGION(SET_COUNT) = [REGION_PLANE, REGION_EDGE, REGION_EDGE, &
-    REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF]
-  !> Admissible violation of a condition, as a share of the stresses involved: some hundred roundings.
+    REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, REGION_CUT_OFF, &
+    REGION_CUT_OFF, REGION_CUT_OFF]
+  !> Admissible violation of a condition, as a share of the stresses involved: some hundred
+  !> roundings.
   real(wp), parameter :: ROUNDING = 1.0e-13_wp
-  !> Guards the division by the radius of Mohr's circle, in Pa; where the radius is 0 so is what it divides.
+  !> Guards the division by the radius of Mohr's circle, in Pa; where the radius is 0 so is what it
+  !> divides.
   real(wp), parameter :: LEAST_RADIUS = 1.0e-100_wp
 
-  !> Trial stresses of a block: principal ones in the plane (a >= b) and out of it (z); radius of Mohr's circle and
+  !> Trial stresses of a block: principal ones in the plane (a >= b) and out of it (z); radius of
+  !> Mohr's circle and
   !> the two components that give its direction.
   type :: principal_t
-    real(wp) :: a(BLOCK), b(BLOCK), z(BLOCK), radius(BLOCK), half_difference(BLOCK), shear_stress(BLOCK)
+    real(wp) :: a(BLOCK), b(BLOCK), z(BLOCK), radius(BLOCK), half_difference(BLOCK), &
+      shear_stress(BLOCK)
   end type principal_t
 
 contains
 
-  !> Opens or closes the gap with the volumetric strain increment; `strain%share` becomes the part of the increment
+  !> Opens or closes the gap with the volumetric strain increment; `strain%share` becomes the part
+  !> of the increment
   !> that is left to strain the material.
   pure subroutine close_gap(n, strain, gap)
     integer, intent(in) :: n
@@ -64,14 +79,18 @@ contains
       trace = strain%exx(p) + strain%eyy(p)
       left = gap(p) + trace
       ! gap > 0 and left < 0 imply trace < 0; elsewhere the guarded quotient is not used.
-      strain%share(p) = merge(merge(left/min(trace, -tiny(1.0_wp)), 0.0_wp, left < 0.0_wp), 1.0_wp, gap(p) > 0.0_wp)
+      strain%share(p) = merge(merge(left/min(trace, -tiny(1.0_wp)), 0.0_wp, left < 0.0_wp), &
+        1.0_wp, gap(p) > 0.0_wp)
       gap(p) = merge(max(left, 0.0_wp), 0.0_wp, gap(p) > 0.0_wp)
     end do
   end subroutine close_gap
 
-  !> Returns the trial stresses of `n` points to the yield surface, in place, and adds to the gap of those at the apex.
-  !> The plane is done for all points at once; the few on an edge, the cut-off or the apex follow one by one.
-  pure subroutine return_stress(n, material, sin_friction, cohesion_term, tension_limit, sxx, syy, szz, sxy, gap)
+  !> Returns the trial stresses of `n` points to the yield surface, in place, and adds to the gap
+  !> of those at the apex.
+  !> The plane is done for all points at once; the few on an edge, the cut-off or the apex follow
+  !> one by one.
+  pure subroutine return_stress(n, material, sin_friction, cohesion_term, tension_limit, sxx, &
+    syy, szz, sxy, gap)
     integer, intent(in) :: n
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: sin_friction(n), cohesion_term(n), tension_limit(n)
@@ -80,7 +99,9 @@ contains
     type(principal_t) :: trial
     real(wp) :: d_first, d_middle, d_last, friction_part, high, middle, low, new_a, new_b
     real(wp) :: centre, yield, multiplier, ratio, stress(4), opening
-    logical :: special(BLOCK)
+    ! Above 0: the plane is not where the point belongs. A real and not a logical, so that the loop
+    ! vectorises.
+    real(wp) :: violation(BLOCK)
     integer :: p
 
     d_middle = 2.0_wp*material%lame*material%sin_dilation
@@ -104,7 +125,7 @@ contains
       high = high - multiplier*d_first
       middle = middle - multiplier*d_middle
       low = low - multiplier*d_last
-      special(p) = high < middle .or. middle < low .or. high > tension_limit(p)
+      violation(p) = max(max(middle - high, low - middle), high - tension_limit(p))
       new_a = merge(high, middle, trial%a(p) >= trial%z(p))
       new_b = merge(low, middle, trial%b(p) <= trial%z(p))
       ratio = 0.5_wp*(new_a - new_b)/max(trial%radius(p), LEAST_RADIUS)
@@ -116,8 +137,9 @@ contains
     end do
 
     do p = 1, n
-      if (.not. special(p)) cycle
-      call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p)], trial, p, stress, opening)
+      if (.not. violation(p) > 0.0_wp) cycle
+      call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p)], &
+        trial, p, stress, opening)
       sxx(p) = stress(1)
       syy(p) = stress(2)
       szz(p) = stress(3)
@@ -126,8 +148,10 @@ contains
     end do
   end subroutine return_stress
 
-  !> Point `p` of the block, whose return is not to the plane: sorts its principal stresses, returns them, and turns
-  !> them back to `stress` = (xx, yy, zz, xy). `opening`: volumetric strain that the apex left without stress.
+  !> Point `p` of the block, whose return is not to the plane: sorts its principal stresses,
+  !> returns them, and turns
+  !> them back to `stress` = (xx, yy, zz, xy). `opening`: volumetric strain that the apex left
+  !> without stress.
   pure subroutine return_special(material, strength, trial, p, stress, opening)
     type(material_t), intent(in) :: material
     !> sin(phi), 2 c cos(phi), T
@@ -155,12 +179,15 @@ contains
       stress(3) = new_z
       stress(4) = ratio*trial%shear_stress(p)
       opening = 0.0_wp
-      if (region == REGION_APEX) opening = max((a + b + z)/3.0_wp - strength(3), 0.0_wp)/material%bulk
+      if (region == REGION_APEX) opening = max((a + b + z)/3.0_wp - strength(3), &
+        0.0_wp)/material%bulk
     end associate
   end subroutine return_special
 
-  !> Exact return of sorted principal trial stresses `trial` (s1 >= s2 >= s3, Pa) to `returned`; the head of the
-  !> module has the equations. `strength` = sin(phi), 2 c cos(phi) in Pa, T in Pa. `region`: a REGION_ constant.
+  !> Exact return of sorted principal trial stresses `trial` (s1 >= s2 >= s3, Pa) to `returned`;
+  !> the head of the
+  !> module has the equations. `strength` = sin(phi), 2 c cos(phi) in Pa, T in Pa. `region`: a
+  !> REGION_ constant.
   pure subroutine return_principal(material, strength, trial, returned, region)
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: strength(3), trial(3)
@@ -190,7 +217,8 @@ contains
 
   contains
 
-    !> Tries one set of active planes: admissible if all multipliers are >= 0 and the result is admissible and sorted.
+    !> Tries one set of active planes: admissible if all multipliers are >= 0 and the result is
+    !> admissible and sorted.
     pure subroutine try_planes(planes, admissible, stress)
       integer, intent(in) :: planes(3)
       logical, intent(out) :: admissible
@@ -200,7 +228,8 @@ contains
 
       stress = trial
       admissible = .false.
-      matrix = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+      matrix = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], &
+        [3, 3])
       multiplier = 0.0_wp
       count = 0
       do k = 1, 3
@@ -225,7 +254,8 @@ contains
     end subroutine try_planes
   end subroutine return_principal
 
-  !> The six planes of the sorted yield surface: normals dF/ds, stress changes D dg/ds, and F(trial) in Pa.
+  !> The six planes of the sorted yield surface: normals dF/ds, stress changes D dg/ds, and
+  !> F(trial) in Pa.
   pure subroutine define_planes(material, strength, trial, normal, change, excess)
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: strength(3), trial(3)
@@ -251,7 +281,8 @@ contains
     end do
   end subroutine define_planes
 
-  !> Solves the leading `count` by `count` system in place by Gaussian elimination with pivoting; a singular one
+  !> Solves the leading `count` by `count` system in place by Gaussian elimination with pivoting; a
+  !> singular one
   !> gives what is not finite, which the caller refuses.
   pure subroutine solve_small(count, matrix, vector)
     integer, intent(in) :: count
@@ -275,7 +306,8 @@ contains
       end do
     end do
     do k = count, 1, -1
-      vector(k) = (vector(k) - dot_product(matrix(k, k + 1:count), vector(k + 1:count)))/matrix(k, k)
+      vector(k) = (vector(k) - dot_product(matrix(k, k + 1:count), vector(k &
+        + 1:count)))/matrix(k, k)
     end do
   end subroutine solve_small
 end module sg_mohr_coulomb
