@@ -1,0 +1,87 @@
+!> Random numbers that are a function of (seed, stream, realization, position) and of nothing else:
+!> Philox4x64-10 (Salmon et al. 2011) of Random123. No state is kept: ranks and order do not matter.
+!>
+!> The key is (seed, stream); the counter is (block, realization, 0, 0) with blocks of four words
+!> counted from 1. NumPy gives the same 64-bit words in the same order:
+!> `Philox(key=[seed, stream], counter=[0, realization, 0, 0]).random_raw(n)`.
+module sg_philox
+  use, intrinsic :: iso_c_binding, only: c_int64_t
+  use sg_kinds, only: i8, wp
+  implicit none
+  private
+
+  public :: fill_uniform, fill_words, philox_block
+  public :: FIELD_STREAM, NOISE_STREAM
+
+  !> Streams: the random field, and the perturbations of the homogeneous members.
+  integer, parameter :: FIELD_STREAM = 1
+  integer, parameter :: NOISE_STREAM = 2
+
+  integer, parameter :: WORDS_PER_BLOCK = 4
+  integer, parameter :: CHUNK_BLOCKS = 256
+
+  interface
+    subroutine sgimp_philox_blocks(key, counter, blocks, words) bind(c)
+      import :: c_int64_t
+      implicit none
+      integer(c_int64_t), intent(in) :: key(2), counter(4)
+      integer(c_int64_t), value :: blocks
+      integer(c_int64_t), intent(inout) :: words(*)
+    end subroutine sgimp_philox_blocks
+  end interface
+
+contains
+
+  !> Uniform numbers in the open interval (0, 1), one of each 64-bit word r:
+  !> (floor(r/2^12) + 1/2) 2^-52. Every value is exact in double precision, and u and 1 - u are
+  !> equally likely; with 53 bits the half would be rounded away, and 1 itself could come out.
+  subroutine fill_uniform(seed, stream, realization, offset, values)
+    integer(i8), intent(in) :: seed
+    !> FIELD_STREAM, NOISE_STREAM.
+    integer, intent(in) :: stream
+    integer(i8), intent(in) :: realization
+    !> Position of the first word wanted, from 0.
+    integer(i8), intent(in) :: offset
+    real(wp), intent(out) :: values(:)
+    integer(i8) :: words(WORDS_PER_BLOCK*CHUNK_BLOCKS)
+    integer :: first, count
+
+    do first = 1, size(values), size(words)
+      count = min(size(words), size(values) - first + 1)
+      call fill_words(seed, stream, realization, offset + first - 1, words(:count))
+      values(first:first + count - 1) = (real(shiftr(words(:count), 12), wp) + 0.5_wp) &
+        *2.0_wp**(-52)
+    end do
+  end subroutine fill_uniform
+
+  !> The 64-bit words themselves, as signed integers with the same bits; arguments as above.
+  subroutine fill_words(seed, stream, realization, offset, words)
+    integer(i8), intent(in) :: seed
+    integer, intent(in) :: stream
+    integer(i8), intent(in) :: realization
+    integer(i8), intent(in) :: offset
+    integer(i8), intent(out) :: words(:)
+    integer(i8) :: key(2), block, buffer(WORDS_PER_BLOCK*CHUNK_BLOCKS)
+    integer :: done, skip, count
+
+    key = [seed, int(stream, i8)]
+    done = 0
+    do while (done < size(words))
+      block = 1 + (offset + done)/WORDS_PER_BLOCK
+      skip = int(mod(offset + done, int(WORDS_PER_BLOCK, i8)))
+      count = min(size(words) - done, size(buffer) - skip)
+      call sgimp_philox_blocks(key, [block, realization, 0_i8, 0_i8], &
+        int((skip + count + WORDS_PER_BLOCK - 1)/WORDS_PER_BLOCK, i8), buffer)
+      words(done + 1:done + count) = buffer(skip + 1:skip + count)
+      done = done + count
+    end do
+  end subroutine fill_words
+
+  !> One block of Philox4x64-10: four words out of four words of counter and two of key.
+  function philox_block(counter, key) result(words)
+    integer(i8), intent(in) :: counter(4), key(2)
+    integer(i8) :: words(4)
+
+    call sgimp_philox_blocks(key, counter, 1_i8, words)
+  end function philox_block
+end module sg_philox
