@@ -30,6 +30,9 @@ module sg_grid
     real(wp) :: x_min, x_max, y_min, y_max
     !> Kinetic energy in J/m, largest speed squared and largest wave speed squared in (m/s)^2.
     real(wp) :: kinetic_energy, speed_squared, wave_squared
+    !> Kinetic energy of the motion of the points, with the velocities they are moved with, J/m. A point can keep a
+    !> velocity that the grid does not see; it moves nothing, and so does not count when rest is looked for.
+    real(wp) :: motion_energy
     !> Work of the stresses in this step, J/m.
     real(wp) :: internal_work
   contains
@@ -76,6 +79,7 @@ contains
     this%kinetic_energy = 0.0_wp
     this%speed_squared = 0.0_wp
     this%wave_squared = 0.0_wp
+    this%motion_energy = 0.0_wp
     this%internal_work = 0.0_wp
   end subroutine reset_tally
 

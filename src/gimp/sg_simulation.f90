@@ -130,7 +130,7 @@ contains
     type(clock_t), intent(inout) :: clock
     real(wp) :: fall
 
-    clock%peak_energy = solver%tally%kinetic_energy
+    clock%peak_energy = solver%tally%kinetic_energy ! at the start both are the same
     clock%calm_needed = SETTLE_PERIODS*4.0_wp*max(scene%extent(2) - scene%extent(1), &
       scene%extent(4) - scene%extent(3)) &
       /scene%wave_speed
@@ -220,14 +220,14 @@ contains
     end subroutine fail
   end subroutine check_step
 
-  !> At rest once the kinetic energy has stayed below its share of the peak for long enough.
+  !> At rest once the kinetic energy of the motion has stayed below its share of the peak for long enough.
   subroutine note_calm(config, solver, clock)
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
 
-    clock%peak_energy = max(clock%peak_energy, solver%tally%kinetic_energy)
-    if (solver%tally%kinetic_energy >= config%solver%settle*clock%peak_energy) then
+    clock%peak_energy = max(clock%peak_energy, solver%tally%motion_energy)
+    if (solver%tally%motion_energy >= config%solver%settle*clock%peak_energy) then
       clock%calm_since = clock%time
     else
       clock%settled = clock%time - clock%calm_since >= clock%calm_needed
@@ -322,8 +322,8 @@ contains
       v(HEIGHT_WALL) = surface_height(s, scene%extent(1), scene%extent(1) + cell, g%y_min) - g%y_min
       v(SETTLED) = merge(1.0_wp, 0.0_wp, clock%settled)
       v(SETTLE_TIME) = clock%calm_since
-      v(KINETIC_ENERGY_END) = solver%tally%kinetic_energy
-      v(KINETIC_ENERGY_RATIO) = solver%tally%kinetic_energy/max(clock%peak_energy, tiny(1.0_wp))
+      v(KINETIC_ENERGY_END) = solver%tally%motion_energy
+      v(KINETIC_ENERGY_RATIO) = solver%tally%motion_energy/max(clock%peak_energy, tiny(1.0_wp))
       touched = scene%extent(2) < g%x_max - cell .and. v(RUNOUT_MAX) + scene%toe > g%x_max - cell
       touched = touched .or. (scene%extent(1) > g%x_min + cell .and. minval(s%x) < g%x_min + cell)
       v(WALL_TOUCHED) = merge(1.0_wp, 0.0_wp, touched)

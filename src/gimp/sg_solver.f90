@@ -198,7 +198,8 @@ contains
       end if
       if (sweep%update_stress) call this%strain_block(time_step, gradient, body, first, last)
       if (sweep%move_with > 0) then
-        call move_points(n, time_step, sweep%move_with, value, p%x(first:last), p%y(first:last))
+        call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), p%x(first:last), &
+                         p%y(first:last), this%tally%motion_energy)
         call this%note_block(first, last)
         call this%find_weights(body, first, last, w)
       end if
@@ -326,18 +327,22 @@ contains
     end do
   end subroutine update_velocity
 
-  !> x_p += v dt with v = value(k:k+1, :).
-  pure subroutine move_points(n, time_step, k, value, x, y)
+  !> x_p += v dt with v = value(k:k+1, :); adds m v^2/2 to `energy`, in J/m.
+  pure subroutine move_points(n, time_step, k, value, mass, x, y, energy)
     integer, intent(in) :: n, k
-    real(wp), intent(in) :: time_step, value(4, BLOCK)
-    real(wp), intent(inout) :: x(n), y(n)
+    real(wp), intent(in) :: time_step, value(4, BLOCK), mass(n)
+    real(wp), intent(inout) :: x(n), y(n), energy
+    real(wp) :: twice
     integer :: p
 
-    !$omp simd
+    twice = 0.0_wp
+    !$omp simd reduction(+:twice)
     do p = 1, n
       x(p) = x(p) + time_step*value(k, p)
       y(p) = y(p) + time_step*value(k + 1, p)
+      twice = twice + mass(p)*(value(k, p)*value(k, p) + value(k + 1, p)*value(k + 1, p))
     end do
+    energy = energy + 0.5_wp*twice
   end subroutine move_points
 
   !> Adds bounds, kinetic energy and the largest speed of the points `first` to `last` to the tally.
