@@ -5,14 +5,14 @@ module sg_bodies
   implicit none
   private
 
-  public :: lattice_t, fill_body, body_extent
+  public :: body_lattice_t, fill_body, body_extent
 
   !> The points of one body: positions [count] in m, and full width and height of a point in m.
-  type :: lattice_t
+  type :: body_lattice_t
     integer :: count = 0
     real(wp), allocatable :: x(:), y(:)
     real(wp) :: width, height
-  end type lattice_t
+  end type body_lattice_t
 
 contains
 
@@ -40,7 +40,7 @@ contains
   pure subroutine fill_body(body, cell_size, lattice)
     type(body_config_t), intent(in) :: body
     real(wp), intent(in) :: cell_size
-    type(lattice_t), intent(out) :: lattice
+    type(body_lattice_t), intent(out) :: lattice
     real(wp) :: box(4), x, y
     integer :: columns, rows, i, j, count
 

@@ -30,8 +30,10 @@ module sg_grid
     real(wp) :: x_min, x_max, y_min, y_max
     !> Kinetic energy in J/m, largest speed squared and largest wave speed squared in (m/s)^2.
     real(wp) :: kinetic_energy, speed_squared, wave_squared
-    !> Kinetic energy of the motion of the points, with the velocities they are moved with, J/m. A point can keep a
-    !> velocity that the grid does not see; it moves nothing, and so does not count when rest is looked for.
+    !> Kinetic energy of the motion of the points, with the velocities they are moved with, J/m. A
+    !> point can keep a
+    !> velocity that the grid does not see; it moves nothing, and so does not count when rest is
+    !> looked for.
     real(wp) :: motion_energy
     !> Work of the stresses in this step, J/m.
     real(wp) :: internal_work

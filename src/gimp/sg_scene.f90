@@ -1,6 +1,6 @@
 !> A scene: everything that all members of an ensemble share. It is built once and never changes.
 module sg_scene
-  use sg_bodies, only: body_extent, fill_body, lattice_t
+  use sg_bodies, only: body_extent, fill_body, body_lattice_t
   use sg_config, only: config_t
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_initial_stress, only: set_geostatic_stress
@@ -28,9 +28,41 @@ module sg_scene
     real(wp) :: first_step, fixed_step
     !> Centres of the columns of cells, in m, [number of cells along x].
     real(wp), allocatable :: profile_x(:)
+  contains
+    procedure :: point_count
+    procedure :: points_of
   end type scene_t
 
 contains
+
+  !> Number of points of a material.
+  pure function point_count(this, material) result(count)
+    class(scene_t), intent(in) :: this
+    integer, intent(in) :: material
+    integer :: count
+
+    associate (b => this%particles%bodies)
+      count = sum(b%last - b%first + 1, mask=b%material == material)
+    end associate
+  end function point_count
+
+  !> Initial places of the points of a material, [point_count], in m and in the order of
+  !> set_friction_angle.
+  pure subroutine points_of(this, material, x, y)
+    class(scene_t), intent(in) :: this
+    integer, intent(in) :: material
+    real(wp), allocatable, intent(out) :: x(:), y(:)
+    integer :: body
+
+    allocate (x(0), y(0))
+    do body = 1, size(this%particles%bodies)
+      associate (b => this%particles%bodies(body))
+        if (b%material /= material) cycle
+        x = [x, this%particles%x_start(b%first:b%last)]
+        y = [y, this%particles%y_start(b%first:b%last)]
+      end associate
+    end do
+  end subroutine points_of
 
   !> Builds the scene of a configuration that passed its checks. A body without a single point is
   !> an error.
@@ -38,7 +70,7 @@ contains
     type(config_t), intent(in) :: config
     type(scene_t), intent(out) :: scene
     type(error_t), allocatable, intent(out) :: error
-    type(lattice_t), allocatable :: lattices(:)
+    type(body_lattice_t), allocatable :: lattices(:)
     integer :: k, count, columns
 
     allocate (scene%materials(size(config%materials)), lattices(size(config%bodies)))
@@ -74,7 +106,7 @@ contains
   !> Puts the points of body `k` into the arrays from `first` on.
   subroutine place_body(config, lattice, k, first, scene)
     type(config_t), intent(in) :: config
-    type(lattice_t), intent(in) :: lattice
+    type(body_lattice_t), intent(in) :: lattice
     integer, intent(in) :: k, first
     type(scene_t), intent(inout) :: scene
     integer :: last, material

@@ -220,7 +220,8 @@ contains
     end subroutine fail
   end subroutine check_step
 
-  !> At rest once the kinetic energy of the motion has stayed below its share of the peak for long enough.
+  !> At rest once the kinetic energy of the motion has stayed below its share of the peak for long
+  !> enough.
   subroutine note_calm(config, solver, clock)
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver

@@ -198,7 +198,8 @@ contains
       end if
       if (sweep%update_stress) call this%strain_block(time_step, gradient, body, first, last)
       if (sweep%move_with > 0) then
-        call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), p%x(first:last), &
+        call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
+          p%x(first:last), &
                          p%y(first:last), this%tally%motion_energy)
         call this%note_block(first, last)
         call this%find_weights(body, first, last, w)

@@ -1,0 +1,182 @@
+!> A member of the ensemble as the paper has it: a random field of strength, the collapse of the
+!> body, one row.
+module sg_collapse
+  use sg_config, only: config_t
+  use sg_errors, only: error_t
+  use sg_kinds, only: i8, wp
+  use sg_member_model, only: member_model_t
+  use sg_monitor, only: monitor_t
+  use sg_observer, only: blind_observer_t
+  use sg_outcome, only: FIELD_CLIPPED, outcome_t, reset_outcome, STATUS_ABANDONED, &
+    STATUS_FIELD_FAILED
+  use sg_philox, only: FIELD_STREAM, fill_uniform, NOISE_STREAM
+  use sg_plan, only: plan_t
+  use sg_random_field, only: random_field_t
+  use sg_recorder, only: recorder_t
+  use sg_scene, only: build_scene, scene_t
+  use sg_simulation, only: simulate, variation_t
+  implicit none
+  private
+
+  public :: collapse_model_t
+
+  !> Homogeneous members beyond the first: CFL number within +-20 %, lines of the grid shifted by
+  !> up to a cell at the
+  !> toe, friction within 1e-6. None of it means anything physically; the spread it makes is the
+  !> noise floor.
+  real(wp), parameter :: STEP_SPREAD = 0.2_wp
+  real(wp), parameter :: FRICTION_SPREAD = 1.0e-6_wp
+
+  type, extends(member_model_t) :: collapse_model_t
+    type(config_t) :: config
+    type(plan_t) :: plan
+    type(scene_t) :: scene
+    !> One Gaussian field for each ACF of the study; the coefficient of variation is set for each
+    !> member.
+    type(random_field_t), allocatable :: fields(:)
+    !> Record every member, with snapshots at their interval (replays).
+    logical :: record_all = .false.
+  contains
+    procedure :: init => init_collapse
+    procedure :: run => run_collapse
+    procedure, private :: vary_homogeneous
+    procedure, private :: vary_by_field
+    procedure, private :: is_recorded
+  end type collapse_model_t
+
+contains
+
+  !> Builds what all members share: the scene and the factors of the fields. Nothing random happens
+  !> here.
+  subroutine init_collapse(this, config, plan, error)
+    class(collapse_model_t), intent(inout) :: this
+    type(config_t), intent(in) :: config
+    type(plan_t), intent(in) :: plan
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+    real(wp), allocatable :: x(:), y(:)
+
+    this%config = config
+    this%plan = plan
+    call build_scene(config, this%scene, error)
+    if (allocated(error)) return
+    if (.not. config%has_random_field) return
+    call this%scene%points_of(config%random_field%material_index, x, y)
+    allocate (this%fields(size(config%study%acf)))
+    do k = 1, size(this%fields)
+      call this%fields(k)%init(config%random_field, trim(config%study%acf(k)), &
+        config%study%cov(1), x, y, error)
+      if (allocated(error)) return
+    end do
+  end subroutine init_collapse
+
+  !> One member; see member_model_t.
+  subroutine run_collapse(this, case_index, id, monitor, outcome)
+    class(collapse_model_t), intent(inout) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+    class(monitor_t), intent(inout) :: monitor
+    type(outcome_t), intent(out) :: outcome
+    type(variation_t) :: variation
+    type(recorder_t) :: recorder
+    type(blind_observer_t) :: nobody
+    type(error_t), allocatable :: error
+    real(wp) :: clipped
+
+    call reset_outcome(outcome, case_index, id, size(this%scene%profile_x))
+    clipped = 0.0_wp
+    if (this%plan%cases(case_index)%is_homogeneous) then
+      call this%vary_homogeneous(case_index, id, variation)
+    else
+      call this%vary_by_field(case_index, id, variation, clipped, error)
+    end if
+    if (allocated(error)) then
+      outcome%status = STATUS_FIELD_FAILED
+      outcome%reason = error%message
+      return
+    end if
+    if (this%is_recorded(id)) then
+      call recorder%open(this%config%output%directory, trim(this%plan%cases(case_index)%label), &
+        id, &
+                         this%config%output%snapshot_interval, &
+                         this%config%output%history_interval, error)
+      if (.not. allocated(error)) then
+        call simulate(this%config, this%scene, variation, monitor, recorder, outcome)
+        if (outcome%status /= STATUS_ABANDONED) call recorder%close(error)
+      end if
+      if (allocated(error)) outcome%reason = 'snapshots not written: '//error%message
+    else
+      call simulate(this%config, this%scene, variation, monitor, nobody, outcome)
+    end if
+    outcome%values(FIELD_CLIPPED) = clipped
+  end subroutine run_collapse
+
+  !> Member 1 is nominal, the others differ by what means nothing. With a random field, the
+  !> strength is its mean.
+  subroutine vary_homogeneous(this, case_index, id, variation)
+    class(collapse_model_t), intent(in) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+    type(variation_t), intent(inout) :: variation
+    real(wp) :: u(3), friction
+    integer :: material
+
+    friction = 1.0_wp
+    if (id > 1) then
+      call fill_uniform(this%config%monte_carlo%seed, NOISE_STREAM, id, 0_i8, u)
+      variation%step_factor = 1.0_wp + STEP_SPREAD*(2.0_wp*u(1) - 1.0_wp)
+      variation%cell_stretch = u(2)*this%config%grid%cell_size/(this%scene%extent(2) &
+        - this%config%grid%x_min)
+      friction = 1.0_wp + FRICTION_SPREAD*(2.0_wp*u(3) - 1.0_wp)
+    end if
+    material = this%config%bodies(1)%material_index
+    if (this%config%has_random_field) material = this%config%random_field%material_index
+    friction = friction*merge(this%plan%cases(case_index)%mean, &
+      this%scene%materials(material)%friction_angle, &
+                              this%config%has_random_field)
+    variation%material = material
+    allocate (variation%friction_angle(this%scene%point_count(material)))
+    variation%friction_angle = friction
+  end subroutine vary_homogeneous
+
+  !> The friction angles of realization `id`.
+  subroutine vary_by_field(this, case_index, id, variation, clipped, error)
+    class(collapse_model_t), intent(inout) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+    type(variation_t), intent(inout) :: variation
+    real(wp), intent(out) :: clipped
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    clipped = 0.0_wp
+    associate (one => this%plan%cases(case_index), field => this%config%random_field)
+      do k = 1, size(this%fields)
+        if (this%config%study%acf(k) == one%acf) exit
+      end do
+      call this%fields(k)%set_cov(field, one%cov, error)
+      if (allocated(error)) return
+      variation%material = field%material_index
+      allocate (variation%friction_angle(this%scene%point_count(field%material_index)))
+      call this%fields(k)%realize(this%config%monte_carlo%seed, FIELD_STREAM, id, &
+        variation%friction_angle, &
+                                  clipped, error)
+    end associate
+  end subroutine vary_by_field
+
+  !> Members that were asked for; without a random field the nominal run, if anything is to be
+  !> recorded at all.
+  pure function is_recorded(this, id) result(recorded)
+    class(collapse_model_t), intent(in) :: this
+    integer(i8), intent(in) :: id
+    logical :: recorded
+
+    associate (output => this%config%output)
+      recorded = this%record_all .or. any(output%snapshot_members == id)
+      if (.not. this%config%has_random_field .and. id == 1) then
+        recorded = recorded .or. output%snapshot_interval > 0.0_wp &
+          .or. output%history_interval > 0.0_wp
+      end if
+    end associate
+  end function is_recorded
+end module sg_collapse
