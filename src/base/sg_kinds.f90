@@ -1,15 +1,17 @@
 !> Kinds used everywhere.
 module sg_kinds
-  use, intrinsic :: iso_fortran_env, only: int32, int64, real32, real64
+  use, intrinsic :: iso_fortran_env, only: int32, int64, int8, real32, real64
   implicit none
   private
 
-  public :: wp, sp, i4, i8
+  public :: wp, sp, i1, i4, i8
 
   !> Working precision of state, geometry and statistics.
   integer, parameter :: wp = real64
   !> Storage precision of bulky output.
   integer, parameter :: sp = real32
+  !> A byte.
+  integer, parameter :: i1 = int8
   integer, parameter :: i4 = int32
   integer, parameter :: i8 = int64
 end module sg_kinds
