@@ -5,8 +5,17 @@ module sg_special_functions
   private
 
   public :: normal_cdf, normal_upper_tail, normal_quantile, normal_upper_quantile, log_one_plus
+  public :: student_quantile
 
   interface
+    !> x of P(x) = p for Student's t with `freedom` degrees of freedom.
+    pure function student_quantile(p, freedom) result(x) bind(c, name='gsl_cdf_tdist_Pinv')
+      import :: c_double
+      implicit none
+      real(c_double), value :: p, freedom
+      real(c_double) :: x
+    end function student_quantile
+
     !> P(x), the standard normal distribution function.
     pure function normal_cdf(x) result(p) bind(c, name='gsl_cdf_ugaussian_P')
       import :: c_double

@@ -1,0 +1,185 @@
+!> Rank 0 of an ensemble: keeps each member in journal and memory, tells of progress, rewrites
+!> ensemble.h5 now and then and decides when the run has to end.
+module sg_director
+  use sg_ensemble, only: case_results_t, run_record_t, write_ensemble
+  use sg_errors, only: error_t
+  use sg_journal, only: journal_t
+  use sg_kinds, only: i8, wp
+  use sg_outcome, only: outcome_t, RUNOUT_Q995, SECONDS, STATUS_OK, status_text
+  use sg_plan, only: plan_t
+  use sg_posix, only: caught_signal, file_exists
+  use sg_progress, only: json_text, progress_t
+  use sg_scheduler, only: CARRY_ON, director_t, FINISH_STARTED, STOP_NOW
+  use sg_statistics, only: contiguous_prefix, describe, sample_statistics_t
+  use sg_text, only: to_text
+  use sg_timer, only: wall_seconds
+  implicit none
+  private
+
+  public :: ensemble_director_t
+
+  type, extends(director_t) :: ensemble_director_t
+    type(plan_t) :: plan
+    type(journal_t) :: journal
+    type(progress_t) :: progress
+    type(run_record_t) :: record
+    type(case_results_t), allocatable :: results(:)
+    character(len=:), allocatable :: directory
+    !> Wall clock of the start and, if the run has a limit, of its end; 0 = none.
+    real(wp) :: start = 0.0_wp, deadline = 0.0_wp
+    real(wp) :: report_seconds = 30.0_wp
+    !> Members computed since the start of this program.
+    integer(i8) :: fresh = 0
+    !> Why the run ends early; not allocated while it does not.
+    character(len=:), allocatable :: stop_reason
+    !> The first error of keeping results: the run ends.
+    type(error_t), allocatable :: error
+    real(wp) :: last_report = 0.0_wp, last_write = 0.0_wp, last_look = 0.0_wp
+    real(wp) :: write_cost = 0.0_wp, longest = 0.0_wp
+  contains
+    procedure :: accept
+    procedure :: decide
+    procedure :: keep
+    procedure :: report
+    procedure :: running_text
+    procedure :: write_results
+    procedure :: count_members
+  end type ensemble_director_t
+
+  !> Between two looks at the file STOP, in s.
+  real(wp), parameter :: LOOK_EVERY = 1.0_wp
+  !> ensemble.h5 may take this share of the time.
+  real(wp), parameter :: WRITE_SHARE = 0.02_wp
+  !> Kept free before the wall clock limit for the end of the run, in s.
+  real(wp), parameter :: END_MARGIN = 1.0_wp
+
+contains
+
+  !> A member that was just computed.
+  subroutine accept(this, outcome)
+    class(ensemble_director_t), intent(inout) :: this
+    type(outcome_t), intent(in) :: outcome
+
+    if (allocated(this%error)) return
+    call this%journal%add(outcome, this%error)
+    if (allocated(this%error)) return
+    call this%keep(outcome)
+    this%fresh = this%fresh + 1
+    if (outcome%status == STATUS_OK) return
+    associate (label => this%results(outcome%case_index)%label)
+      call this%progress%say('member '//to_text(outcome%id)//' of '//label//' failed ('// &
+        status_text(outcome%status)//'): '//outcome%reason)
+      call this%progress%tell('member_failed', '"case":'//json_text(label)//',"id":'// &
+        to_text(outcome%id)//',"status":'//to_text(outcome%status)//',"reason":'// &
+        json_text(outcome%reason))
+    end associate
+  end subroutine accept
+
+  !> Into memory only; members outside the plan (of a longer run before) stay in the journal.
+  subroutine keep(this, outcome)
+    class(ensemble_director_t), intent(inout) :: this
+    type(outcome_t), intent(in) :: outcome
+
+    if (.not. this%plan%holds(outcome%case_index, outcome%id)) return
+    call this%results(outcome%case_index)%put(outcome)
+    if (outcome%values(SECONDS) > this%longest) this%longest = outcome%values(SECONDS)
+  end subroutine keep
+
+  function decide(this) result(decision)
+    class(ensemble_director_t), intent(inout) :: this
+    integer :: decision
+    real(wp) :: now, left
+
+    decision = CARRY_ON
+    now = wall_seconds()
+    if (allocated(this%error)) then
+      this%stop_reason = this%error%message
+      decision = STOP_NOW
+    else if (caught_signal() /= 0) then
+      this%stop_reason = 'signal '//to_text(caught_signal())
+      decision = STOP_NOW
+    else if (now - this%last_look >= LOOK_EVERY) then
+      this%last_look = now
+      if (file_exists(this%directory//'/STOP')) then
+        this%stop_reason = 'the file STOP'
+        decision = STOP_NOW
+      end if
+    end if
+    if (decision == STOP_NOW) return
+    if (this%deadline > 0.0_wp) then
+      left = this%deadline - now - END_MARGIN - 2.0_wp*this%write_cost
+      if (left <= 0.0_wp) decision = STOP_NOW
+      if (left > 0.0_wp .and. left < 1.1_wp*this%longest) decision = FINISH_STARTED
+      if (decision /= CARRY_ON) this%stop_reason = 'the wall clock limit'
+    end if
+    if (now - this%last_report >= this%report_seconds) call this%report()
+    if (now - this%last_write >= max(this%report_seconds, this%write_cost/WRITE_SHARE)) &
+      call this%write_results(this%error)
+  end function decide
+
+  !> A line of progress.
+  subroutine report(this)
+    class(ensemble_director_t), intent(inout) :: this
+    integer(i8) :: done, failed
+
+    call this%count_members(done, failed)
+    this%last_report = wall_seconds()
+    call this%progress%report(done, this%plan%total(), failed, this%fresh, &
+      this%last_report - this%start, this%running_text())
+  end subroutine report
+
+  !> Mean of the 99.5 % runout with its 95 % interval, in the study case that has come farthest, over
+  !> its ids without a gap.
+  function running_text(this) result(text)
+    class(ensemble_director_t), intent(in) :: this
+    character(len=:), allocatable :: text
+    type(sample_statistics_t) :: s
+    integer :: i, n, best, most
+
+    best = 1
+    most = 0
+    do i = 1, size(this%results)
+      n = contiguous_prefix(this%results(i)%present)
+      if (n == 0 .or. n < most) cycle
+      if (n == most .and. .not. this%results(best)%is_homogeneous) cycle
+      best = i
+      most = n
+    end do
+    text = ''
+    if (most == 0) return
+    associate (r => this%results(best))
+      s = describe(r%values(RUNOUT_Q995, :most), r%status(:most) == STATUS_OK)
+      if (s%count == 0) return
+      text = ', runout_q995 of '//r%label//' '//to_text(s%mean, 5)
+      if (s%count > 1) text = text//' +- '//to_text(s%half_width, 2)
+      text = text//' m (95 %, n='//to_text(s%count)//')'
+    end associate
+  end function running_text
+
+  subroutine write_results(this, error)
+    class(ensemble_director_t), intent(inout) :: this
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: begin
+
+    begin = wall_seconds()
+    call write_ensemble(this%directory, this%record, this%results, error)
+    this%last_write = wall_seconds()
+    this%write_cost = this%last_write - begin
+  end subroutine write_results
+
+  !> Members of the plan that are there, and how many of them failed.
+  subroutine count_members(this, done, failed)
+    class(ensemble_director_t), intent(in) :: this
+    integer(i8), intent(out) :: done, failed
+    integer :: i
+
+    done = 0
+    failed = 0
+    do i = 1, size(this%results)
+      associate (r => this%results(i))
+        done = done + count(r%present, kind=i8)
+        failed = failed + count(pack(r%status, r%present) /= STATUS_OK, kind=i8)
+      end associate
+    end do
+  end subroutine count_members
+end module sg_director

@@ -1,0 +1,191 @@
+!> ensemble.h5: all results of a run, written whole from memory under a temporary name and put in the
+!> place of the old one, so that the file that is there can always be opened.
+module sg_ensemble
+  use sg_errors, only: error_t
+  use sg_hdf5_file, only: hdf5_file_t
+  use sg_kinds, only: i4, i8, sp, wp
+  use sg_outcome, only: COLUMN_COUNT, COLUMNS, outcome_t
+  use sg_posix, only: replace_file
+  use sg_version, only: COMPILER, COMPILER_FLAGS, GIT_DIRTY, GIT_HASH, LIBRARIES, VERSION
+  implicit none
+  private
+
+  public :: case_results_t, run_record_t, write_ensemble, ENSEMBLE_NAME
+
+  character(len=*), parameter :: ENSEMBLE_NAME = 'ensemble.h5'
+  integer, parameter :: REASON_LENGTH = 160
+
+  !> The members of one study case that are there, at the position of their id.
+  type :: case_results_t
+    character(len=:), allocatable :: label, acf, distribution
+    real(wp) :: cov = 0.0_wp, mean = 0.0_wp, scale_x = 0.0_wp, scale_y = 0.0_wp
+    logical :: is_homogeneous = .false.
+    !> [members]
+    logical, allocatable :: present(:)
+    integer(i4), allocatable :: status(:)
+    !> [COLUMN_COUNT, members] and [columns of the profile, members]
+    real(wp), allocatable :: values(:, :)
+    real(sp), allocatable :: height(:, :)
+    character(len=REASON_LENGTH), allocatable :: reason(:)
+  contains
+    procedure :: init
+    procedure :: put
+  end type case_results_t
+
+  !> What the root of the file says of the run.
+  type :: run_record_t
+    character(len=:), allocatable :: case_text, resolved, host, started, ended, state, config_hash
+    integer(i8) :: seed = 0
+    integer :: ranks = 1, realizations = 0
+    real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
+    real(wp) :: x_min = 0.0_wp, x_max = 0.0_wp, y_min = 0.0_wp, y_max = 0.0_wp
+    real(wp) :: cell_size = 0.0_wp, point_spacing = 0.0_wp
+    !> Cell centres of the columns of the profile, in m.
+    real(wp), allocatable :: profile_x(:)
+  end type run_record_t
+
+contains
+
+  !> Room for `members` members; none is there yet.
+  subroutine init(this, members, profile_columns)
+    class(case_results_t), intent(inout) :: this
+    integer(i8), intent(in) :: members
+    integer, intent(in) :: profile_columns
+
+    allocate (this%present(members), this%status(members), this%reason(members))
+    allocate (this%values(COLUMN_COUNT, members), this%height(profile_columns, members))
+    this%present = .false.
+  end subroutine init
+
+  !> Keeps a member; the first one of an id counts. Ids outside the plan are left alone.
+  subroutine put(this, outcome)
+    class(case_results_t), intent(inout) :: this
+    type(outcome_t), intent(in) :: outcome
+    integer :: columns
+
+    associate (id => outcome%id)
+      if (id < 1 .or. id > size(this%present)) return
+      if (this%present(id)) return
+      this%present(id) = .true.
+      this%status(id) = int(outcome%status, i4)
+      this%values(:, id) = outcome%values
+      this%height(:, id) = 0.0_sp
+      if (allocated(outcome%height)) then
+        columns = min(size(outcome%height), size(this%height, 1))
+        this%height(:columns, id) = outcome%height(:columns)
+      end if
+      this%reason(id) = ''
+      if (allocated(outcome%reason)) this%reason(id) = outcome%reason
+    end associate
+  end subroutine put
+
+  subroutine write_ensemble(directory, record, results, error)
+    character(len=*), intent(in) :: directory
+    type(run_record_t), intent(in) :: record
+    type(case_results_t), intent(in) :: results(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(hdf5_file_t) :: file
+    character(len=:), allocatable :: path
+    integer :: i
+
+    path = directory//'/'//ENSEMBLE_NAME
+    call file%create(path//'.new', error)
+    if (allocated(error)) return
+    call write_provenance(file, record)
+    call write_geometry(file, record)
+    call file%make_group('/cases')
+    do i = 1, size(results)
+      call write_case(file, results(i), i, record%profile_x)
+    end do
+    call file%close(error)
+    if (.not. allocated(error)) call replace_file(path//'.new', path, error)
+  end subroutine write_ensemble
+
+  subroutine write_provenance(file, record)
+    type(hdf5_file_t), intent(inout) :: file
+    type(run_record_t), intent(in) :: record
+
+    call file%set('/', 'program', 'sgimp')
+    call file%set('/', 'version', VERSION)
+    call file%set('/', 'git_hash', GIT_HASH)
+    call file%set('/', 'git_dirty', merge(1_i4, 0_i4, GIT_DIRTY))
+    call file%set('/', 'compiler', COMPILER)
+    call file%set('/', 'compiler_flags', COMPILER_FLAGS)
+    call file%set('/', 'libraries', LIBRARIES)
+    call file%set('/', 'host', record%host)
+    call file%set('/', 'ranks', int(record%ranks, i4))
+    call file%set('/', 'started', record%started)
+    call file%set('/', 'ended', record%ended)
+    call file%set('/', 'seed', record%seed)
+    call file%set('/', 'config_hash', record%config_hash)
+    call file%set('/', 'state', record%state)
+    call file%set('/', 'realizations', int(record%realizations, i4))
+    call file%set('/', 'namelist', record%case_text)
+    call file%set('/', 'resolved_namelist', record%resolved)
+  end subroutine write_provenance
+
+  subroutine write_geometry(file, record)
+    type(hdf5_file_t), intent(inout) :: file
+    type(run_record_t), intent(in) :: record
+
+    call file%make_group('/geometry')
+    call file%set('/geometry', 'toe', record%toe)
+    call file%set('/geometry', 'initial_height', record%initial_height)
+    call file%set('/geometry', 'initial_width', record%initial_width)
+    call file%set('/geometry', 'x_min', record%x_min)
+    call file%set('/geometry', 'x_max', record%x_max)
+    call file%set('/geometry', 'y_min', record%y_min)
+    call file%set('/geometry', 'y_max', record%y_max)
+    call file%set('/geometry', 'cell_size', record%cell_size)
+    call file%set('/geometry', 'point_spacing', record%point_spacing)
+  end subroutine write_geometry
+
+  subroutine write_case(file, results, order, profile_x)
+    type(hdf5_file_t), intent(inout) :: file
+    type(case_results_t), intent(in) :: results
+    integer, intent(in) :: order
+    real(wp), intent(in) :: profile_x(:)
+    character(len=:), allocatable :: group
+    integer, allocatable :: rows(:)
+    integer :: i
+
+    group = '/cases/'//results%label
+    rows = pack([(i, i=1, size(results%present))], results%present)
+    call file%make_group(group)
+    call file%set(group, 'label', results%label)
+    call file%set(group, 'acf', results%acf)
+    call file%set(group, 'cov', results%cov)
+    call file%set(group, 'mean', results%mean)
+    call file%set(group, 'distribution', results%distribution)
+    call file%set(group, 'scale_x', results%scale_x)
+    call file%set(group, 'scale_y', results%scale_y)
+    call file%set(group, 'is_homogeneous', merge(1_i4, 0_i4, results%is_homogeneous))
+    call file%set(group, 'planned', int(size(results%present), i4))
+    call file%set(group, 'order', int(order, i4))
+    call file%write(group//'/id', int(rows, i8), '1')
+    call file%write(group//'/status', results%status(rows), '1')
+    do i = 1, COLUMN_COUNT
+      call write_column(file, group, i, results%values(i, rows))
+    end do
+    call file%write(group//'/reason', results%reason(rows), '')
+    call file%make_group(group//'/profile')
+    call file%write(group//'/profile/x', profile_x, 'm')
+    call file%write(group//'/profile/height', results%height(:, rows), 'm')
+  end subroutine write_case
+
+  subroutine write_column(file, group, column, values)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: column
+    real(wp), intent(in) :: values(:)
+    character(len=:), allocatable :: name, units
+
+    name = group//'/'//trim(COLUMNS(column)%name)
+    units = trim(COLUMNS(column)%units)
+    if (COLUMNS(column)%is_integer) then
+      call file%write(name, nint(values, i8), units)
+    else
+      call file%write(name, values, units)
+    end if
+  end subroutine write_column
+end module sg_ensemble
