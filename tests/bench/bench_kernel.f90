@@ -1,0 +1,153 @@
+!> Cost per point and step on the paper's column: whole runs of the three schemes, and where the
+!> time of usl goes.
+!> Usage: bench_kernel CASE.nml [end_time]. Prints; judges nothing. Quote ratios or quiet machines.
+program bench_kernel
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use sg_config, only: config_t
+  use sg_errors, only: error_t
+  use sg_kinds, only: i8, wp
+  use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power, update_volume
+  use sg_mohr_coulomb, only: close_gap, return_stress
+  use sg_monitor, only: patient_monitor_t
+  use sg_observer, only: blind_observer_t
+  use sg_outcome, only: outcome_t, reset_outcome, SECONDS, STEPS
+  use sg_posix, only: read_text
+  use sg_read_config, only: read_config
+  use sg_scene, only: build_scene, scene_t
+  use sg_simulation, only: simulate, variation_t
+  use sg_solver, only: solver_t
+  use sg_timer, only: wall_seconds
+  use sg_transfer, only: gather_motion_and_gradient, map_momentum_and_force
+  use sg_weighting, only: BLOCK, weights_t
+  implicit none
+
+  character(len=4), parameter :: SCHEMES(3) = ['usl ', 'musl', 'usf ']
+  type(config_t) :: config
+  type(scene_t) :: scene
+  type(error_t), allocatable :: error
+  character(len=512) :: argument
+  character(len=:), allocatable :: text
+  integer :: k
+
+  call get_command_argument(1, argument)
+  call read_text(trim(argument), text, error)
+  call stop_on_error()
+  call read_config(text, trim(argument), config, error)
+  call stop_on_error()
+  call get_command_argument(2, argument)
+  if (argument /= '') read (argument, *) config%solver%end_time
+  call build_scene(config, scene, error)
+  call stop_on_error()
+  print '(a, i0, a, f6.3, a)', 'points ', scene%particles%count, ', cells of ', &
+    config%grid%cell_size, ' m'
+  do k = 1, size(SCHEMES)
+    call time_run(trim(SCHEMES(k)))
+  end do
+  call time_phases()
+
+contains
+
+  subroutine stop_on_error()
+    if (.not. allocated(error)) return
+    write (error_unit, '(a)') error%message
+    stop 2
+  end subroutine stop_on_error
+
+  !> A whole run; the flowing phase costs more than the first steps.
+  subroutine time_run(scheme)
+    character(len=*), intent(in) :: scheme
+    type(variation_t) :: variation
+    type(patient_monitor_t) :: monitor
+    type(blind_observer_t) :: observer
+    type(outcome_t) :: outcome
+
+    config%solver%scheme = scheme
+    call reset_outcome(outcome, 1, 1_i8, size(scene%profile_x))
+    call simulate(config, scene, variation, monitor, observer, outcome)
+    print '(a5, f8.1, a, i7, a, f7.2, a)', scheme, &
+      1.0e9_wp*outcome%values(SECONDS)/(outcome%values(STEPS)*scene%particles%count), &
+      ' ns per point and step, grid included;', nint(outcome%values(STEPS)), ' steps,', &
+      outcome%values(SECONDS), ' s'
+  end subroutine time_run
+
+  !> Each part by itself, on the state after a second of flow. Parts run apart lose what the block
+  !> in the cache saves,
+  !> so their sum is above the whole.
+  subroutine time_phases()
+    integer, parameter :: REPEATS = 200
+    type(solver_t) :: solver
+    type(weights_t) :: w
+    type(strain_t) :: strain
+    real(wp) :: value(4, BLOCK), gradient(4, BLOCK), ns(5), started, work, damping_work
+    character(len=24), parameter :: NAMES(5) = [character(len=24) :: 'weights (twice)', 'gather', &
+      'strain and stress', 'map to nodes', 'nodes']
+    integer :: repeat, first, last, n, part
+
+    config%solver%scheme = 'usl'
+    solver%materials = scene%materials
+    solver%particles = scene%particles
+    call solver%configure(config)
+    call solver%grid%init(config%grid, 0.0_wp, minval(scene%particles%mass))
+    call solver%start()
+    do n = 1, nint(1.0_wp/scene%first_step)
+      call solver%advance(scene%first_step)
+    end do
+    ns = 0.0_wp
+    work = 0.0_wp
+    do part = 1, 5
+      started = wall_seconds()
+      do repeat = 1, REPEATS
+        do first = 1, solver%particles%bodies(1)%last, BLOCK
+          last = min(first + BLOCK - 1, solver%particles%bodies(1)%last)
+          n = last - first + 1
+          associate (p => solver%particles, g => solver%grid, b => solver%particles%bodies(1), &
+                     m => solver%materials(solver%particles%bodies(1)%material))
+            select case (part)
+            case (1)
+              call solver%axis_weights(n, p%x(first:last), g%x_origin, g%inverse_cell, &
+                b%width*g%inverse_cell, &
+                                       g%last_base_x, w%i, w%sx, w%gx)
+              call solver%axis_weights(n, p%y(first:last), g%y_origin, g%inverse_cell, &
+                b%height*g%inverse_cell, &
+                                       g%last_base_y, w%j, w%sy, w%gy)
+            case (2)
+              call gather_motion_and_gradient(n, w, g%nx, g%ny, g%motion_store(g%motion_start), &
+                value, gradient)
+            case (3)
+              gradient = 0.0_wp
+              call find_strain(n, 1.0e-3_wp, gradient, strain)
+              work = work + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
+                p%syy(first:last), &
+                                         p%sxy(first:last))
+              call update_volume(n, strain, p%volume(first:last))
+              call close_gap(n, strain, p%gap(first:last))
+              call predict_stress(n, m%lame, m%shear, strain, p%sxx(first:last), &
+                p%syy(first:last), &
+                                  p%szz(first:last), p%sxy(first:last))
+              call return_stress(n, m, p%sin_friction(first:last), p%cohesion_term(first:last), &
+                                 p%tension_limit(first:last), p%sxx(first:last), &
+                                 p%syy(first:last), &
+                                 p%szz(first:last), p%sxy(first:last), p%gap(first:last))
+            case (4)
+              call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), &
+                p%vy(first:last), &
+                                          p%volume(first:last), p%sxx(first:last), &
+                                          p%syy(first:last), &
+                                          p%sxy(first:last), g%nx, g%ny, &
+                                          g%total_store(g%total_start))
+            end select
+          end associate
+        end do
+        if (part == 5) call solver%grid%integrate_momentum(1.0e-3_wp, solver%gravity, &
+          solver%damping, damping_work)
+      end do
+      ns(part) = 1.0e9_wp*(wall_seconds() - started)/(real(REPEATS, wp)*solver%particles%count)
+    end do
+    ns(1) = 2.0_wp*ns(1)
+    do part = 1, 5
+      print '(2x, a, f7.1, a, f6.1, a)', NAMES(part), ns(part), ' ns  ', &
+        100.0_wp*ns(part)/sum(ns), ' %'
+    end do
+    if (work > huge(1.0_wp)) print '(a)', 'not finite'
+  end subroutine time_phases
+end program bench_kernel
