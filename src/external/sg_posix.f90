@@ -10,7 +10,8 @@ module sg_posix
 
   public :: append_file_t
   public :: catch_signals, caught_signal
-  public :: file_exists, file_size, read_file, replace_file, write_file, make_directory
+  public :: end_program
+  public :: file_exists, file_size, read_file, read_text, replace_file, write_file, make_directory
   public :: remove_file, remove_files
   public :: host_name, utc_time, sleep_seconds, checksum, hash_text
 
@@ -28,6 +29,12 @@ module sg_posix
   end type append_file_t
 
   interface
+    subroutine c_exit(code) bind(c, name='exit')
+      import :: c_int
+      implicit none
+      integer(c_int), value :: code
+    end subroutine c_exit
+
     function sg_catch_signals() bind(c) result(status)
       import :: c_int
       implicit none
@@ -267,6 +274,27 @@ contains
       EXIT_BAD_INPUT, error)
     if (.not. allocated(error)) bytes = bytes(:length)
   end subroutine read_file
+
+  !> A whole text file.
+  subroutine read_text(path, text, error)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable, intent(out) :: text
+    type(error_t), allocatable, intent(out) :: error
+    integer(i1), allocatable :: bytes(:)
+
+    text = ''
+    call read_file(path, bytes, error)
+    if (allocated(error)) return
+    text = repeat(' ', size(bytes))
+    text = transfer(bytes, text)
+  end subroutine read_text
+
+  !> Ends the program with an exit code, without a word (a Fortran stop would print one).
+  subroutine end_program(code)
+    integer, intent(in) :: code
+
+    call c_exit(int(code, c_int))
+  end subroutine end_program
 
   !> Puts `from` in the place of `to`, at once and synced.
   subroutine replace_file(from, to, error)

@@ -36,6 +36,8 @@ module sg_collapse
     type(random_field_t), allocatable :: fields(:)
     !> Record every member, with snapshots at their interval (replays).
     logical :: record_all = .false.
+    !> Record none, whatever the configuration says (replays without snapshots).
+    logical :: record_nothing = .false.
   contains
     procedure :: init => init_collapse
     procedure :: run => run_collapse

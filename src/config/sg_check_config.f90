@@ -1,0 +1,444 @@
+!> What several keys of a case must satisfy together. A check is made only where all keys it looks at
+!> have passed on their own, so that one mistake gives one fault.
+module sg_check_config
+  use sg_config, only: body_config_t, config_t
+  use sg_fault_list, only: did_you_mean, fault_list_t, quoted
+  use sg_kinds, only: i8, wp
+  use sg_namelist, only: namelist_t
+  use sg_polygon, only: corners_are_distinct, polygon_area, polygon_is_simple
+  use sg_schema, only: count_words, key_row, KEYS, word_at
+  use sg_text, only: to_text
+  implicit none
+  private
+
+  public :: check_config
+
+  !> How far a length may be from a whole number of cells, in cells a cell: rounding of a decimal
+  !> number is 1e-16, a mistake is not below 1e-3.
+  real(wp), parameter :: WHOLE_TOLERANCE = 1.0e-6_wp
+  !> A body may stick out of the grid by this share of a cell, for the same reason.
+  real(wp), parameter :: EDGE_TOLERANCE = 1.0e-6_wp
+  !> More cells than this do not fit into memory: a misplaced decimal point.
+  real(wp), parameter :: MOST_CELLS = 1.0e8_wp
+
+  !> What a check works on.
+  type :: desk_t
+    type(config_t) :: config
+    type(namelist_t) :: nml
+    type(fault_list_t) :: faults
+  contains
+    procedure :: good
+    procedure :: fault
+  end type desk_t
+
+contains
+
+  !> Adds what is wrong to `faults`. `config` was filled from `nml`, with neutral values for keys that
+  !> are missing or faulty.
+  subroutine check_config(config, nml, faults)
+    type(config_t), intent(in) :: config
+    type(namelist_t), intent(in) :: nml
+    type(fault_list_t), intent(inout) :: faults
+    type(desk_t) :: desk
+    integer :: i
+
+    desk%config = config
+    desk%nml = nml
+    desk%faults = faults
+    call check_grid(desk)
+    do i = 1, size(config%materials)
+      call check_material(desk, i)
+    end do
+    do i = 1, size(config%bodies)
+      call check_body(desk, i)
+    end do
+    call check_loading(desk)
+    call check_solver(desk)
+    if (config%has_random_field) call check_random_field(desk)
+    if (config%has_study) call check_study(desk)
+    call check_output(desk)
+    faults = desk%faults
+  end subroutine check_config
+
+  !> Whether all the keys (words between blanks) have values: checked ones or defaults.
+  logical function good(this, group, occurrence, names)
+    class(desk_t), intent(in) :: this
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: occurrence
+    character(len=*), intent(in) :: names
+    integer :: g, e, i
+
+    good = .true.
+    g = this%nml%locate(group, occurrence)
+    do i = 1, count_words(names)
+      e = 0
+      if (g > 0) e = this%nml%groups(g)%find(word_at(names, i))
+      if (e > 0) then
+        good = good .and. this%nml%groups(g)%entries(e)%usable
+      else
+        good = good .and. len_trim(KEYS(key_row(group, word_at(names, i)))%default) > 0
+      end if
+    end do
+  end function good
+
+  !> Reports a fault at a key (which may be absent).
+  subroutine fault(this, group, occurrence, key, what)
+    class(desk_t), intent(inout) :: this
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: occurrence
+    character(len=*), intent(in) :: key, what
+
+    call this%faults%add(this%nml%line_of(group, occurrence, key), '&'//group//' '//key, what)
+  end subroutine fault
+
+  subroutine check_grid(desk)
+    type(desk_t), intent(inout) :: desk
+    logical :: fits
+
+    fits = .true.
+    call check_extent(desk, 'x_min', 'x_max', desk%config%grid%x_min, desk%config%grid%x_max, fits)
+    call check_extent(desk, 'y_min', 'y_max', desk%config%grid%y_min, desk%config%grid%y_max, fits)
+    if (.not. fits .or. .not. desk%good('grid', 1, 'x_min x_max y_min y_max cell_size')) return
+    associate (grid => desk%config%grid)
+      if ((grid%x_max - grid%x_min)/grid%cell_size*((grid%y_max - grid%y_min)/grid%cell_size) > &
+        MOST_CELLS) then
+        call desk%fault('grid', 1, 'cell_size', to_text(grid%cell_size)//' m makes more cells than '// &
+          'any machine can hold (allowed: up to '//to_text(MOST_CELLS)//' cells)')
+      end if
+    end associate
+  end subroutine check_grid
+
+  !> The grid has a positive, whole number of cells along an axis.
+  subroutine check_extent(desk, low_key, high_key, low, high, fits)
+    type(desk_t), intent(inout) :: desk
+    character(len=*), intent(in) :: low_key, high_key
+    real(wp), intent(in) :: low, high
+    logical, intent(inout) :: fits
+    real(wp) :: cells
+
+    if (.not. desk%good('grid', 1, low_key//' '//high_key)) return
+    if (high <= low) then
+      fits = .false.
+      call desk%fault('grid', 1, high_key, to_text(high)//' is not above '//low_key//' = '//to_text(low))
+      return
+    end if
+    if (.not. desk%good('grid', 1, 'cell_size')) return
+    cells = (high - low)/desk%config%grid%cell_size
+    if (abs(cells - anint(cells)) > WHOLE_TOLERANCE*cells .or. cells < 0.5_wp) then
+      call desk%fault('grid', 1, high_key, high_key//' - '//low_key//' = '//to_text(high - low, 9)// &
+        ' m is '//to_text(cells, 6)//' cells of '//to_text(desk%config%grid%cell_size)// &
+        ' m (allowed: a whole number of cells, for instance '//high_key//' = '// &
+        to_text(low + max(anint(cells), 1.0_wp)*desk%config%grid%cell_size, 12)//')')
+    end if
+  end subroutine check_extent
+
+  subroutine check_material(desk, i)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+    integer :: j
+
+    associate (material => desk%config%materials(i))
+      if (desk%good('material', i, 'name')) then
+        do j = 1, i - 1
+          if (desk%config%materials(j)%name /= material%name) cycle
+          call desk%fault('material', i, 'name', quoted(material%name)//' is taken by the material in '// &
+            'line '//to_text(desk%nml%line_of('material', j, 'name')))
+          exit
+        end do
+      end if
+      if (desk%good('material', i, 'friction_angle dilation_angle')) then
+        if (material%dilation_angle > material%friction_angle) call desk%fault('material', i, &
+          'dilation_angle', to_text(material%dilation_angle)//' exceeds friction_angle = '// &
+          to_text(material%friction_angle)//' (allowed: up to friction_angle)')
+      end if
+      if (material%model == 'mohr_coulomb' .and. desk%good('material', i, &
+        'friction_angle cohesion tension_strength')) call check_apex(desk, i)
+    end associate
+  end subroutine check_material
+
+  !> The tensile strength of a Mohr-Coulomb material ends at the apex of its pyramid.
+  subroutine check_apex(desk, i)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+    real(wp), parameter :: RADIANS = acos(-1.0_wp)/180.0_wp
+    real(wp) :: apex
+
+    associate (material => desk%config%materials(i))
+      if (material%friction_angle <= 0.0_wp) return
+      apex = material%cohesion/tan(material%friction_angle*RADIANS)
+      if (material%tension_strength > apex*(1.0_wp + 1.0e-6_wp)) then
+        call desk%fault('material', i, 'tension_strength', to_text(material%tension_strength)// &
+          ' Pa is beyond the apex of the yield surface, cohesion/tan(friction_angle) = '// &
+          to_text(apex, 6)//' Pa (allowed: up to that)')
+      end if
+    end associate
+  end subroutine check_apex
+
+  subroutine check_body(desk, i)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+    integer :: j
+
+    associate (body => desk%config%bodies(i))
+      if (desk%good('body', i, 'name')) then
+        do j = 1, i - 1
+          if (desk%config%bodies(j)%name /= body%name) cycle
+          call desk%fault('body', i, 'name', quoted(body%name)//' is taken by the body in line '// &
+            to_text(desk%nml%line_of('body', j, 'name')))
+          exit
+        end do
+      end if
+      if (desk%good('body', i, 'material')) &
+        call check_material_name(desk, 'body', i, body%material, body%material_index)
+      if (.not. desk%good('body', i, 'shape')) return
+      select case (body%shape)
+      case ('rectangle')
+        if (desk%good('body', i, 'x y width height')) call check_inside(desk, i, 'width', &
+          [body%x, body%y], [body%x + body%width, body%y + body%height])
+      case ('disc')
+        if (desk%good('body', i, 'x y radius')) call check_inside(desk, i, 'radius', &
+          [body%x, body%y] - body%radius, [body%x, body%y] + body%radius)
+      case ('polygon')
+        if (desk%good('body', i, 'vertices')) call check_polygon(desk, i)
+      end select
+    end associate
+  end subroutine check_body
+
+  subroutine check_material_name(desk, group, i, name, material_index)
+    type(desk_t), intent(inout) :: desk
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: i
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: material_index
+    character(len=:), allocatable :: hint
+    integer :: j
+
+    if (material_index > 0 .or. size(desk%config%materials) == 0) return
+    ! The name of a material that is itself faulty cannot be compared.
+    do j = 1, size(desk%config%materials)
+      if (.not. desk%good('material', j, 'name')) return
+    end do
+    hint = 'allowed: '//trim(desk%config%materials(1)%name)
+    do j = 2, size(desk%config%materials)
+      hint = hint//', '//trim(desk%config%materials(j)%name)
+    end do
+    if (len(did_you_mean(name, desk%config%materials%name, '')) > 0) &
+      hint = hint//'; '//did_you_mean(name, desk%config%materials%name, '')
+    call desk%fault(group, i, 'material', 'there is no material '//quoted(name)//' ('//hint//')')
+  end subroutine check_material_name
+
+  !> The box from `low` to `high` lies in the grid. `key` is where a fault is reported.
+  subroutine check_inside(desk, i, key, low, high)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+    character(len=*), intent(in) :: key
+    real(wp), intent(in) :: low(2), high(2)
+    real(wp) :: slack
+
+    if (.not. desk%good('grid', 1, 'x_min x_max y_min y_max cell_size')) return
+    associate (grid => desk%config%grid)
+      slack = EDGE_TOLERANCE*grid%cell_size
+      if (low(1) < grid%x_min - slack .or. high(1) > grid%x_max + slack) then
+        call desk%fault('body', i, key, 'the body reaches from x = '//to_text(low(1), 6)//' to '// &
+          to_text(high(1), 6)//', out of the grid (allowed: '//to_text(grid%x_min)//' to '// &
+          to_text(grid%x_max)//')')
+      end if
+      if (low(2) < grid%y_min - slack .or. high(2) > grid%y_max + slack) then
+        call desk%fault('body', i, key_of_height(key), 'the body reaches from y = '// &
+          to_text(low(2), 6)//' to '//to_text(high(2), 6)//', out of the grid (allowed: '// &
+          to_text(grid%y_min)//' to '//to_text(grid%y_max)//')')
+      end if
+    end associate
+
+  contains
+
+    function key_of_height(key) result(name)
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable :: name
+      name = key
+      if (key == 'width') name = 'height'
+    end function key_of_height
+  end subroutine check_inside
+
+  subroutine check_polygon(desk, i)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+    real(wp), allocatable :: corners(:, :)
+    integer :: first, second
+
+    associate (vertices => desk%config%bodies(i)%vertices)
+      if (mod(size(vertices), 2) /= 0) then
+        call desk%fault('body', i, 'vertices', to_text(size(vertices))//' values are no pairs '// &
+          '(write x1, y1, x2, y2, ...)')
+        return
+      end if
+      if (size(vertices) < 6) then
+        call desk%fault('body', i, 'vertices', 'a polygon with '//to_text(size(vertices)/2)// &
+          ' corners has no area (allowed: 3 corners or more, as x1, y1, x2, y2, ...)')
+        return
+      end if
+      corners = reshape(vertices, [2, size(vertices)/2])
+    end associate
+    call corners_are_distinct(corners, first, second)
+    if (first > 0) then
+      call desk%fault('body', i, 'vertices', 'corners '//to_text(first)//' and '//to_text(second)// &
+        ' are the same point (the polygon closes by itself: do not repeat the first corner)')
+      return
+    end if
+    call polygon_is_simple(corners, first, second)
+    if (first > 0) then
+      call desk%fault('body', i, 'vertices', 'the sides that start at corners '//to_text(first)// &
+        ' and '//to_text(second)//' cross or touch (give the corners in order along the edge)')
+      return
+    end if
+    if (.not. polygon_area(corners) > 0.0_wp) then
+      call desk%fault('body', i, 'vertices', 'all corners lie on one line: the polygon has no area')
+      return
+    end if
+    call check_inside(desk, i, 'vertices', minval(corners, dim=2), maxval(corners, dim=2))
+  end subroutine check_polygon
+
+  subroutine check_loading(desk)
+    type(desk_t), intent(inout) :: desk
+
+    if (.not. desk%good('loading', 1, 'gravity initial_stress')) return
+    associate (loading => desk%config%loading)
+      if (loading%initial_stress == 'geostatic' .and. &
+        (loading%gravity(1) /= 0.0_wp .or. .not. loading%gravity(2) < 0.0_wp)) then
+        call desk%fault('loading', 1, 'initial_stress', '''geostatic'' needs gravity straight down, '// &
+          'not gravity = '//to_text(loading%gravity(1))//', '//to_text(loading%gravity(2))// &
+          ' (allowed: gravity = 0, negative; or ''none'')')
+      end if
+    end associate
+  end subroutine check_loading
+
+  subroutine check_solver(desk)
+    type(desk_t), intent(inout) :: desk
+
+    if (.not. desk%good('solver', 1, 'time_step end_time')) return
+    associate (solver => desk%config%solver)
+      if (solver%time_step > solver%end_time) call desk%fault('solver', 1, 'time_step', &
+        to_text(solver%time_step)//' is longer than the whole run, end_time = '// &
+        to_text(solver%end_time))
+    end associate
+  end subroutine check_solver
+
+  subroutine check_random_field(desk)
+    type(desk_t), intent(inout) :: desk
+    integer :: m, i
+    logical :: is_used
+
+    associate (field => desk%config%random_field)
+      call check_bounds(desk)
+      if (.not. desk%good('random_field', 1, 'material')) return
+      m = field%material_index
+      call check_material_name(desk, 'random_field', 1, field%material, m)
+      if (m == 0) return
+      is_used = .false.
+      do i = 1, size(desk%config%bodies)
+        is_used = is_used .or. desk%config%bodies(i)%material == field%material .or. &
+          .not. desk%good('body', i, 'material')
+      end do
+      if (.not. is_used) call desk%fault('random_field', 1, 'material', 'no &body is of material '// &
+        quoted(field%material))
+      if (.not. desk%good('material', m, 'model')) return
+      if (desk%config%materials(m)%model /= 'mohr_coulomb') then
+        call desk%fault('random_field', 1, 'material', quoted(field%material)//' is '// &
+          trim(desk%config%materials(m)%model)//' and has no friction angle to vary (allowed: a '// &
+          'material with model = ''mohr_coulomb'')')
+        return
+      end if
+      call check_field_and_material(desk, m)
+    end associate
+  end subroutine check_random_field
+
+  !> lower < mean < upper, within what the property can be.
+  subroutine check_bounds(desk)
+    type(desk_t), intent(inout) :: desk
+    !> A friction angle of 90 degrees has no Mohr-Coulomb pyramid.
+    real(wp), parameter :: RIGHT_ANGLE = 90.0_wp
+
+    associate (field => desk%config%random_field)
+      if (desk%good('random_field', 1, 'lower mean')) then
+        if (.not. field%lower < field%mean) call desk%fault('random_field', 1, 'lower', &
+          to_text(field%lower)//' is not below mean = '//to_text(field%mean))
+      end if
+      if (desk%good('random_field', 1, 'mean upper')) then
+        if (.not. field%mean < field%upper) call desk%fault('random_field', 1, 'upper', &
+          to_text(field%upper)//' is not above mean = '//to_text(field%mean))
+      end if
+      if (desk%good('random_field', 1, 'property upper')) then
+        if (.not. field%upper < RIGHT_ANGLE) call desk%fault('random_field', 1, 'upper', &
+          to_text(field%upper)//' is no friction angle (allowed: less than 90 deg)')
+      end if
+    end associate
+  end subroutine check_bounds
+
+  subroutine check_field_and_material(desk, m)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: m
+
+    associate (field => desk%config%random_field, material => desk%config%materials(m))
+      if (desk%good('random_field', 1, 'mean') .and. desk%good('material', m, 'friction_angle')) then
+        if (field%mean /= material%friction_angle) call desk%fault('random_field', 1, 'mean', &
+          to_text(field%mean)//' differs from friction_angle = '//to_text(material%friction_angle)// &
+          ' of material '//quoted(material%name)//' (line '// &
+          to_text(desk%nml%line_of('material', m, 'friction_angle'))//'), with which the '// &
+          'homogeneous case runs (allowed: the same value in both)')
+      end if
+      if (desk%good('random_field', 1, 'lower') .and. desk%good('material', m, 'dilation_angle')) then
+        if (material%dilation_angle > field%lower) call desk%fault('random_field', 1, 'lower', &
+          'friction angles down to '//to_text(field%lower)//' fall below dilation_angle = '// &
+          to_text(material%dilation_angle)//' of material '//quoted(material%name)// &
+          ' (allowed: lower of at least dilation_angle)')
+      end if
+    end associate
+  end subroutine check_field_and_material
+
+  subroutine check_study(desk)
+    type(desk_t), intent(inout) :: desk
+    integer :: g, i, j
+
+    g = desk%nml%locate('study', 1)
+    if (desk%nml%groups(g)%number == 0) then
+      call desk%faults%add(desk%nml%groups(g)%line, '&study', 'this group lists nothing (give acf, '// &
+        'cov or both, or leave the group out)')
+    end if
+    associate (study => desk%config%study)
+      if (desk%good('study', 1, 'acf')) then
+        do i = 2, size(study%acf)
+          do j = 1, i - 1
+            if (study%acf(i) == study%acf(j)) call desk%fault('study', 1, 'acf', &
+              quoted(study%acf(i))//' is listed twice')
+          end do
+        end do
+      end if
+      if (desk%good('study', 1, 'cov')) then
+        do i = 2, size(study%cov)
+          do j = 1, i - 1
+            if (study%cov(i) == study%cov(j)) call desk%fault('study', 1, 'cov', &
+              to_text(study%cov(i))//' is listed twice')
+          end do
+        end do
+      end if
+    end associate
+  end subroutine check_study
+
+  subroutine check_output(desk)
+    type(desk_t), intent(inout) :: desk
+    integer :: i
+
+    if (.not. desk%good('output', 1, 'snapshot_members')) return
+    if (.not. desk%good('monte_carlo', 1, 'realizations')) return
+    associate (members => desk%config%output%snapshot_members, &
+      realizations => desk%config%monte_carlo%realizations)
+      do i = 1, size(members)
+        if (members(i) > realizations) call desk%fault('output', 1, 'snapshot_members', &
+          to_text(members(i))//' is beyond the last realization (allowed: 1 to '// &
+          to_text(realizations)//')')
+        if (any(members(:i - 1) == members(i))) call desk%fault('output', 1, 'snapshot_members', &
+          to_text(members(i))//' is listed twice')
+      end do
+    end associate
+  end subroutine check_output
+end module sg_check_config

@@ -1,0 +1,199 @@
+!> The command line: words in, options out.
+module sg_command_line
+  use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
+  use sg_fault_list, only: did_you_mean
+  use sg_kinds, only: wp
+  implicit none
+  private
+
+  public :: options_t, parse_command_line, usage_text
+
+  type :: options_t
+    !> The case file; empty where none is needed.
+    character(len=:), allocatable :: case_file
+    logical :: check = .false., keys = .false., json = .false., defaults = .false.
+    logical :: snapshots = .false., overwrite = .false., version = .false., help = .false.
+    !> Group for --keys; empty for all.
+    character(len=:), allocatable :: keys_group
+    !> Member to replay; 0 for none, and the case it belongs to; empty for the only one.
+    integer :: realization = 0
+    character(len=:), allocatable :: study_case
+    !> Directory instead of that of the case file; empty for none.
+    character(len=:), allocatable :: output
+    !> Wall clock limit of the whole run in s; 0 for none.
+    real(wp) :: walltime = 0.0_wp
+  end type options_t
+
+  character(len=*), parameter :: KNOWN(12) = [character(len=13) :: '--check', '--keys', &
+    '--json', '--defaults', &
+    '--realization', '--study-case', '--snapshots', '--output', '--overwrite', '--walltime', &
+    '--version', '--help']
+
+contains
+
+  !> Bad input: an unknown option, a missing or wrong value, no case file or more than one.
+  subroutine parse_command_line(words, options, error)
+    character(len=*), intent(in) :: words(:)
+    type(options_t), intent(out) :: options
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    options%case_file = ''
+    options%keys_group = ''
+    options%study_case = ''
+    options%output = ''
+    k = 1
+    do while (k <= size(words) .and. .not. allocated(error))
+      call take_word(words, k, options, error)
+      k = k + 1
+    end do
+    if (allocated(error)) return
+    if (options%help .or. options%version .or. options%keys .or. options%defaults) return
+    if (options%case_file == '') then
+      call fail('no case file given. Usage: sgimp CASE.nml [options]; see sgimp --help', error)
+    else if (options%realization == 0 .and. (options%snapshots .or. options%study_case /= '')) then
+      call fail('--snapshots and --study-case belong to --realization', error)
+    end if
+  end subroutine parse_command_line
+
+  !> Takes word `k`, and the value behind it where the option has one.
+  subroutine take_word(words, k, options, error)
+    character(len=*), intent(in) :: words(:)
+    integer, intent(inout) :: k
+    type(options_t), intent(inout) :: options
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: value
+    integer :: status
+
+    select case (words(k))
+    case ('--check')
+      options%check = .true.
+    case ('--keys')
+      options%keys = .true.
+      if (k < size(words)) then
+        if (words(k + 1) (1:1) /= '-') call take_value('a group', options%keys_group)
+      end if
+      if (options%keys_group /= '') then
+        if (options%keys_group(1:1) == '&') options%keys_group = options%keys_group(2:)
+      end if
+    case ('--json')
+      options%json = .true.
+    case ('--defaults')
+      options%defaults = .true.
+    case ('--snapshots')
+      options%snapshots = .true.
+    case ('--overwrite')
+      options%overwrite = .true.
+    case ('--version', '-V')
+      options%version = .true.
+    case ('--help', '-h')
+      options%help = .true.
+    case ('--study-case')
+      call take_value('the label of a case', options%study_case)
+    case ('--output')
+      call take_value('a directory', options%output)
+    case ('--realization')
+      call take_value('a number', value)
+      if (allocated(error)) return
+      read (value, *, iostat=status) options%realization
+      if (status /= 0 .or. options%realization < 1 .or. verify(value, '0123456789') > 0) then
+        call fail('--realization needs a whole number from 1 on, not '//value, error)
+      end if
+    case ('--walltime')
+      call take_value('HH:MM:SS', value)
+      if (allocated(error)) return
+      call read_duration(value, options%walltime, error)
+    case default
+      call take_case_file(trim(words(k)), options, error)
+    end select
+
+  contains
+
+    subroutine take_value(what, text)
+      character(len=*), intent(in) :: what
+      character(len=:), allocatable, intent(out) :: text
+
+      text = ''
+      if (k == size(words)) then
+        call fail(trim(words(k))//' needs '//what, error)
+        return
+      end if
+      k = k + 1
+      text = trim(words(k))
+    end subroutine take_value
+  end subroutine take_word
+
+  !> A word that is no option is the case file; there is only one.
+  subroutine take_case_file(word, options, error)
+    character(len=*), intent(in) :: word
+    type(options_t), intent(inout) :: options
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (word == '') then
+      call fail('an empty word is no case file', error)
+    else if (word(1:1) == '-') then
+      call fail('unknown option '//word//suggestion(word)//'; see sgimp --help', error)
+    else if (options%case_file /= '') then
+      call fail('one case file, please: both '//options%case_file//' and '//word//' are given', &
+        error)
+    else
+      options%case_file = word
+    end if
+  end subroutine take_case_file
+
+  function suggestion(word) result(text)
+    character(len=*), intent(in) :: word
+    character(len=:), allocatable :: text
+
+    text = did_you_mean(word, KNOWN, '')
+    if (text /= '') text = ' ('//text//')'
+  end function suggestion
+
+  !> Hours:minutes:seconds, minutes:seconds, or seconds.
+  subroutine read_duration(text, seconds, error)
+    character(len=*), intent(in) :: text
+    real(wp), intent(out) :: seconds
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: first, mark, number, status
+
+    seconds = 0.0_wp
+    first = 1
+    status = verify(text, '0123456789:')
+    do while (first <= len(text) .and. status == 0)
+      mark = index(text(first:)//':', ':')
+      read (text(first:first + mark - 2), *, iostat=status) number
+      seconds = 60.0_wp*seconds + number
+      first = first + mark
+    end do
+    if (status /= 0 .or. .not. seconds > 0.0_wp) then
+      call fail('--walltime needs HH:MM:SS above zero, not '//text, error)
+    end if
+  end subroutine read_duration
+
+  subroutine fail(message, error)
+    character(len=*), intent(in) :: message
+    type(error_t), allocatable, intent(inout) :: error
+    call raise(error, EXIT_BAD_INPUT, message, 'command line')
+  end subroutine fail
+
+  !> What --help prints.
+  pure function usage_text() result(text)
+    character(len=:), allocatable :: text
+    character(len=*), parameter :: N = new_line('a')
+
+    text = 'Runout of landslides and granular flows over random fields of soil strength.'//N//N// &
+      'Usage:  mpirun -n RANKS sgimp CASE.nml [options]     run, or go on where a run was stopped'//N// &
+      '        sgimp --keys [GROUP] [--json]                every key: type, unit, default, range, meaning'//N// &
+      '        sgimp --defaults                             a case file to start from'//N//N// &
+      '  --check                 check the case and say what it would take; writes nothing'//N// &
+      '  --output DIR            directory of the results, instead of the one in the case file'//N// &
+      '  --overwrite             throw away what the directory holds'//N// &
+      '  --walltime HH:MM:SS     end cleanly within this time; the same command goes on later'//N// &
+      '  --realization I         compute one member again, by itself, and print its row'//N// &
+      '    --study-case LABEL    of this case of a study, as snx_cov0.05 or deterministic'//N// &
+      '    --snapshots           and write its states to DIR/snapshots'//N// &
+      '  --version, --help'//N//N// &
+      'Exit codes: 0 complete; 1 internal error; 2 bad input; 3 stopped early, resumable; 4 complete, but more'//N// &
+      'failed members than allowed. To stop a run cleanly: touch DIR/STOP, or send SIGUSR1 or SIGTERM.'
+  end function usage_text
+end module sg_command_line

@@ -1,0 +1,257 @@
+!> Which component of `config_t` belongs to which key: said once, for reading and for writing.
+!> Within a group, a key that decides whether others apply comes before them.
+module sg_config_fields
+  use sg_config, only: config_t
+  use sg_kinds, only: i8, wp
+  implicit none
+  private
+
+  public :: config_visitor_t, visit_config
+
+  !> Sees every key once; reads the value into the component or takes it from there.
+  type, abstract :: config_visitor_t
+  contains
+    procedure(begin_group_interface), deferred :: begin_group
+    procedure(visit_real_interface), deferred :: visit_real
+    procedure(visit_pair_interface), deferred :: visit_pair
+    procedure(visit_reals_interface), deferred :: visit_reals
+    procedure(visit_integer_interface), deferred :: visit_integer
+    procedure(visit_long_interface), deferred :: visit_long
+    procedure(visit_integers_interface), deferred :: visit_integers
+    procedure(visit_word_interface), deferred :: visit_word
+    procedure(visit_words_interface), deferred :: visit_words
+    procedure(visit_text_interface), deferred :: visit_text
+    generic :: visit => visit_real, visit_integer, visit_long, visit_word
+    generic :: visit_list => visit_reals, visit_integers, visit_words
+  end type config_visitor_t
+
+  abstract interface
+    !> The keys that follow are of the `occurrence`-th group of this name.
+    subroutine begin_group_interface(this, group, occurrence)
+      import :: config_visitor_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: group
+      integer, intent(in) :: occurrence
+    end subroutine begin_group_interface
+
+    subroutine visit_real_interface(this, key, value)
+      import :: config_visitor_t, wp
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      real(wp), intent(inout) :: value
+    end subroutine visit_real_interface
+
+    subroutine visit_pair_interface(this, key, value)
+      import :: config_visitor_t, wp
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      real(wp), intent(inout) :: value(2)
+    end subroutine visit_pair_interface
+
+    subroutine visit_reals_interface(this, key, value)
+      import :: config_visitor_t, wp
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      real(wp), allocatable, intent(inout) :: value(:)
+    end subroutine visit_reals_interface
+
+    subroutine visit_integer_interface(this, key, value)
+      import :: config_visitor_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      integer, intent(inout) :: value
+    end subroutine visit_integer_interface
+
+    subroutine visit_long_interface(this, key, value)
+      import :: config_visitor_t, i8
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      integer(i8), intent(inout) :: value
+    end subroutine visit_long_interface
+
+    subroutine visit_integers_interface(this, key, value)
+      import :: config_visitor_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      integer, allocatable, intent(inout) :: value(:)
+    end subroutine visit_integers_interface
+
+    subroutine visit_word_interface(this, key, value)
+      import :: config_visitor_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      character(len=*), intent(inout) :: value
+    end subroutine visit_word_interface
+
+    subroutine visit_words_interface(this, key, value)
+      import :: config_visitor_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      character(len=*), allocatable, intent(inout) :: value(:)
+    end subroutine visit_words_interface
+
+    subroutine visit_text_interface(this, key, value)
+      import :: config_visitor_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable, intent(inout) :: value
+    end subroutine visit_text_interface
+  end interface
+
+contains
+
+  !> Shows every key of `config` to the visitor. `materials` and `bodies` have their sizes and
+  !> `has_random_field`, `has_study` their values already. Groups that the run has not got are left out.
+  subroutine visit_config(config, visitor)
+    type(config_t), intent(inout) :: config
+    class(config_visitor_t), intent(inout) :: visitor
+    integer :: i
+
+    call visitor%begin_group('case', 1)
+    call visitor%visit('name', config%name)
+    call visitor%visit_text('title', config%title)
+    call visit_grid(config, visitor)
+    do i = 1, size(config%materials)
+      call visit_material(config, i, visitor)
+    end do
+    do i = 1, size(config%bodies)
+      call visit_body(config, i, visitor)
+    end do
+    call visitor%begin_group('loading', 1)
+    call visitor%visit_pair('gravity', config%loading%gravity)
+    call visitor%visit('damping', config%loading%damping)
+    call visitor%visit('initial_stress', config%loading%initial_stress)
+    call visit_solver(config, visitor)
+    if (config%has_random_field) call visit_random_field(config, visitor)
+    call visit_monte_carlo(config, visitor)
+    if (config%has_study) then
+      call visitor%begin_group('study', 1)
+      call visitor%visit_list('acf', config%study%acf)
+      call visitor%visit_list('cov', config%study%cov)
+    end if
+    call visit_output(config, visitor)
+  end subroutine visit_config
+
+  subroutine visit_grid(config, visitor)
+    type(config_t), intent(inout) :: config
+    class(config_visitor_t), intent(inout) :: visitor
+
+    call visitor%begin_group('grid', 1)
+    call visitor%visit('x_min', config%grid%x_min)
+    call visitor%visit('x_max', config%grid%x_max)
+    call visitor%visit('y_min', config%grid%y_min)
+    call visitor%visit('y_max', config%grid%y_max)
+    call visitor%visit('cell_size', config%grid%cell_size)
+    call visitor%visit('left', config%grid%left)
+    call visitor%visit('right', config%grid%right)
+    call visitor%visit('bottom', config%grid%bottom)
+    call visitor%visit('top', config%grid%top)
+  end subroutine visit_grid
+
+  subroutine visit_material(config, i, visitor)
+    type(config_t), intent(inout) :: config
+    integer, intent(in) :: i
+    class(config_visitor_t), intent(inout) :: visitor
+
+    associate (material => config%materials(i))
+      call visitor%begin_group('material', i)
+      call visitor%visit('name', material%name)
+      call visitor%visit('model', material%model)
+      call visitor%visit('density', material%density)
+      call visitor%visit('young', material%young)
+      call visitor%visit('poisson', material%poisson)
+      call visitor%visit('friction_angle', material%friction_angle)
+      call visitor%visit('dilation_angle', material%dilation_angle)
+      call visitor%visit('cohesion', material%cohesion)
+      call visitor%visit('tension_strength', material%tension_strength)
+    end associate
+  end subroutine visit_material
+
+  subroutine visit_body(config, i, visitor)
+    type(config_t), intent(inout) :: config
+    integer, intent(in) :: i
+    class(config_visitor_t), intent(inout) :: visitor
+
+    associate (body => config%bodies(i))
+      call visitor%begin_group('body', i)
+      call visitor%visit('name', body%name)
+      call visitor%visit('material', body%material)
+      call visitor%visit('shape', body%shape)
+      call visitor%visit('x', body%x)
+      call visitor%visit('y', body%y)
+      call visitor%visit('width', body%width)
+      call visitor%visit('height', body%height)
+      call visitor%visit('radius', body%radius)
+      call visitor%visit_list('vertices', body%vertices)
+      call visitor%visit('points_per_cell', body%points_per_cell)
+      call visitor%visit_pair('velocity', body%velocity)
+    end associate
+  end subroutine visit_body
+
+  subroutine visit_solver(config, visitor)
+    type(config_t), intent(inout) :: config
+    class(config_visitor_t), intent(inout) :: visitor
+
+    call visitor%begin_group('solver', 1)
+    call visitor%visit('weighting', config%solver%weighting)
+    call visitor%visit('scheme', config%solver%scheme)
+    call visitor%visit('flip', config%solver%flip)
+    call visitor%visit('time_step', config%solver%time_step)
+    call visitor%visit('cfl', config%solver%cfl)
+    call visitor%visit('end_time', config%solver%end_time)
+    call visitor%visit('settle', config%solver%settle)
+  end subroutine visit_solver
+
+  subroutine visit_random_field(config, visitor)
+    type(config_t), intent(inout) :: config
+    class(config_visitor_t), intent(inout) :: visitor
+
+    call visitor%begin_group('random_field', 1)
+    call visitor%visit('property', config%random_field%property)
+    call visitor%visit('material', config%random_field%material)
+    call visitor%visit('distribution', config%random_field%distribution)
+    call visitor%visit('mean', config%random_field%mean)
+    call visitor%visit('cov', config%random_field%cov)
+    call visitor%visit('acf', config%random_field%acf)
+    call visitor%visit('scale_x', config%random_field%scale_x)
+    call visitor%visit('scale_y', config%random_field%scale_y)
+    call visitor%visit('lower', config%random_field%lower)
+    call visitor%visit('upper', config%random_field%upper)
+    call visitor%visit('method', config%random_field%method)
+  end subroutine visit_random_field
+
+  subroutine visit_monte_carlo(config, visitor)
+    type(config_t), intent(inout) :: config
+    class(config_visitor_t), intent(inout) :: visitor
+
+    call visitor%begin_group('monte_carlo', 1)
+    call visitor%visit('realizations', config%monte_carlo%realizations)
+    call visitor%visit('seed', config%monte_carlo%seed)
+    call visitor%visit('stop_rule', config%monte_carlo%stop_rule)
+    call visitor%visit('noise_members', config%monte_carlo%noise_members)
+    call visitor%visit('max_failed_fraction', config%monte_carlo%max_failed_fraction)
+    call visitor%visit('member_seconds', config%monte_carlo%member_seconds)
+  end subroutine visit_monte_carlo
+
+  subroutine visit_output(config, visitor)
+    type(config_t), intent(inout) :: config
+    class(config_visitor_t), intent(inout) :: visitor
+
+    call visitor%begin_group('output', 1)
+    call visitor%visit_text('directory', config%output%directory)
+    call visitor%visit('snapshot_interval', config%output%snapshot_interval)
+    call visitor%visit('history_interval', config%output%history_interval)
+    call visitor%visit_list('snapshot_members', config%output%snapshot_members)
+    call visitor%visit('report_seconds', config%output%report_seconds)
+  end subroutine visit_output
+end module sg_config_fields

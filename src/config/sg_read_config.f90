@@ -1,0 +1,268 @@
+!> From the text of a case file to the typed configuration. The text is scanned and checked against
+!> the schema, then the components of `config_t` are filled, then checked together. All faults are
+!> reported at once.
+module sg_read_config
+  use sg_check_config, only: check_config
+  use sg_check_keys, only: check_keys
+  use sg_config, only: config_t, NAME_LENGTH
+  use sg_config_fields, only: config_visitor_t, visit_config
+  use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
+  use sg_fault_list, only: fault_list_t
+  use sg_kinds, only: i8, wp
+  use sg_namelist, only: namelist_t, nml_value_t
+  use sg_number_text, only: parse_integer, parse_real
+  use sg_scan, only: scan_namelist
+  use sg_schema, only: count_words, key_row, KEYS, KIND_WORD, word_at
+  use sg_text, only: lower_case
+  implicit none
+  private
+
+  public :: read_config
+
+  !> Takes values from a scanned case file, or defaults where it has none.
+  type, extends(config_visitor_t) :: reader_t
+    type(namelist_t) :: nml
+    character(len=16) :: group_name = ''
+    !> Index of the present group, 0 if the file has not got it.
+    integer :: group = 0
+    logical :: is_deterministic = .false.
+  contains
+    procedure :: values_of
+    procedure :: begin_group
+    procedure :: visit_real
+    procedure :: visit_pair
+    procedure :: visit_reals
+    procedure :: visit_integer
+    procedure :: visit_long
+    procedure :: visit_integers
+    procedure :: visit_word
+    procedure :: visit_words
+    procedure :: visit_text
+  end type reader_t
+
+contains
+
+  !> Fills `config` from `text`, a whole case file. On faults `error` has code EXIT_BAD_INPUT and as
+  !> message all faults, one a line, each `file:line: &group key: what is wrong`.
+  subroutine read_config(text, file_name, config, error)
+    character(len=*), intent(in) :: text
+    !> For messages only.
+    character(len=*), intent(in) :: file_name
+    type(config_t), intent(out) :: config
+    type(error_t), allocatable, intent(out) :: error
+    type(reader_t) :: reader
+    type(fault_list_t) :: faults
+
+    call scan_namelist(text, reader%nml, faults)
+    call check_keys(reader%nml, faults)
+
+    config%has_random_field = reader%nml%count('random_field') > 0
+    config%has_study = config%has_random_field .and. reader%nml%count('study') > 0
+    reader%is_deterministic = .not. config%has_random_field
+    allocate (config%materials(reader%nml%count('material')))
+    allocate (config%bodies(reader%nml%count('body')))
+    call visit_config(config, reader)
+    call complete(config, reader%nml)
+
+    call check_config(config, reader%nml, faults)
+    if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
+  end subroutine read_config
+
+  !> Values that follow from others.
+  subroutine complete(config, nml)
+    type(config_t), intent(inout) :: config
+    type(namelist_t), intent(in) :: nml
+    character(len=*), parameter :: NAME_MARK = '<name>'
+    integer :: i, mark, study
+
+    do i = 1, size(config%bodies)
+      config%bodies(i)%material_index = index_of_material(config, config%bodies(i)%material)
+    end do
+    mark = index(config%output%directory, NAME_MARK)
+    if (mark > 0) config%output%directory = config%output%directory(:mark - 1)// &
+      trim(config%name)//config%output%directory(mark + len(NAME_MARK):)
+    if (.not. config%has_random_field) then
+      config%random_field%material_index = 0
+      return
+    end if
+    config%random_field%material_index = index_of_material(config, config%random_field%material)
+    if (.not. config%has_study) return
+    study = nml%locate('study', 1)
+    if (size(config%study%acf) == 0) then
+      config%study%acf = [config%random_field%acf]
+    else if (len_trim(config%random_field%acf) == 0) then
+      config%random_field%acf = config%study%acf(1)
+    end if
+    if (size(config%study%cov) == 0) then
+      config%study%cov = [config%random_field%cov]
+    else if (.not. config%random_field%cov > 0.0_wp) then
+      config%random_field%cov = config%study%cov(1)
+    end if
+  end subroutine complete
+
+  pure integer function index_of_material(config, name) result(i)
+    type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: name
+
+    do i = size(config%materials), 1, -1
+      if (config%materials(i)%name == name) return
+    end do
+  end function index_of_material
+
+  subroutine begin_group(this, group, occurrence)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: group
+    integer, intent(in) :: occurrence
+
+    this%group_name = group
+    this%group = this%nml%locate(group, occurrence)
+  end subroutine begin_group
+
+  !> The values of a key, from the file or by default; none for a key without either.
+  subroutine values_of(this, key, values)
+    class(reader_t), intent(in) :: this
+    character(len=*), intent(in) :: key
+    type(nml_value_t), allocatable, intent(out) :: values(:)
+    character(len=:), allocatable :: default
+    integer :: entry, row, i
+
+    row = key_row(this%group_name, key)
+    entry = 0
+    if (this%group > 0) entry = this%nml%groups(this%group)%find(key)
+    if (entry > 0) then
+      if (this%nml%groups(this%group)%entries(entry)%usable) then
+        values = this%nml%groups(this%group)%entries(entry)%values( &
+          :this%nml%groups(this%group)%entries(entry)%number)
+        if (KEYS(row)%kind == KIND_WORD) then
+          do i = 1, size(values)
+            values(i)%text = lower_case(values(i)%text)
+          end do
+        end if
+        return
+      end if
+    end if
+    default = trim(KEYS(row)%default)
+    if (this%is_deterministic .and. len_trim(KEYS(row)%default_deterministic) > 0) &
+      default = trim(KEYS(row)%default_deterministic)
+    allocate (values(count_words(default)))
+    do i = 1, size(values)
+      values(i)%text = word_at(default, i)
+    end do
+  end subroutine values_of
+
+  pure real(wp) function real_of(value)
+    type(nml_value_t), intent(in) :: value
+    character(len=:), allocatable :: fault
+
+    call parse_real(value%text, real_of, fault)
+  end function real_of
+
+  pure integer(i8) function long_of(value)
+    type(nml_value_t), intent(in) :: value
+    character(len=:), allocatable :: fault
+
+    call parse_integer(value%text, long_of, fault)
+  end function long_of
+
+  subroutine visit_real(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    real(wp), intent(inout) :: value
+    type(nml_value_t), allocatable :: values(:)
+
+    call this%values_of(key, values)
+    value = 0.0_wp
+    if (size(values) > 0) value = real_of(values(1))
+  end subroutine visit_real
+
+  subroutine visit_pair(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    real(wp), intent(inout) :: value(2)
+    real(wp), allocatable :: list(:)
+
+    call this%visit_reals(key, list)
+    value = 0.0_wp
+    if (size(list) == 2) value = list
+  end subroutine visit_pair
+
+  subroutine visit_reals(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    real(wp), allocatable, intent(inout) :: value(:)
+    type(nml_value_t), allocatable :: values(:)
+    integer :: i
+
+    call this%values_of(key, values)
+    value = [(real_of(values(i)), i=1, size(values))]
+  end subroutine visit_reals
+
+  subroutine visit_integer(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    integer, intent(inout) :: value
+    integer(i8) :: long
+
+    call this%visit_long(key, long)
+    value = int(long)
+  end subroutine visit_integer
+
+  subroutine visit_long(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    integer(i8), intent(inout) :: value
+    type(nml_value_t), allocatable :: values(:)
+
+    call this%values_of(key, values)
+    value = 0_i8
+    if (size(values) > 0) value = long_of(values(1))
+  end subroutine visit_long
+
+  subroutine visit_integers(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    integer, allocatable, intent(inout) :: value(:)
+    type(nml_value_t), allocatable :: values(:)
+    integer :: i
+
+    call this%values_of(key, values)
+    value = [(int(long_of(values(i))), i=1, size(values))]
+  end subroutine visit_integers
+
+  subroutine visit_word(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    character(len=*), intent(inout) :: value
+    type(nml_value_t), allocatable :: values(:)
+
+    call this%values_of(key, values)
+    value = ''
+    if (size(values) > 0) value = values(1)%text
+  end subroutine visit_word
+
+  subroutine visit_words(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    character(len=*), allocatable, intent(inout) :: value(:)
+    type(nml_value_t), allocatable :: values(:)
+    integer :: i
+
+    call this%values_of(key, values)
+    if (allocated(value)) deallocate (value)
+    allocate (value(size(values)))
+    do i = 1, size(values)
+      value(i) = values(i)%text
+    end do
+  end subroutine visit_words
+
+  subroutine visit_text(this, key, value)
+    class(reader_t), intent(inout) :: this
+    character(len=*), intent(in) :: key
+    character(len=:), allocatable, intent(inout) :: value
+    type(nml_value_t), allocatable :: values(:)
+
+    call this%values_of(key, values)
+    value = ''
+    if (size(values) > 0) value = trim(values(1)%text)
+  end subroutine visit_text
+end module sg_read_config

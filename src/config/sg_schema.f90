@@ -1,0 +1,347 @@
+!> What a case file may hold: one row for each group and each key. Scanning, checking, reading,
+!> `resolved.nml`, `--keys` and `--defaults` all follow this table.
+!>
+!> Words in `choices` are accepted; words in `later` are known, but belong to a later version and
+!> are refused. A new key needs a row here, a line in `sg_config_fields` and a component of `config_t`.
+module sg_schema
+  implicit none
+  private
+
+  public :: group_t, key_t
+  public :: GROUPS, KEYS
+  public :: KIND_REAL, KIND_INTEGER, KIND_WORD, KIND_NAME, KIND_TEXT, ANY_NUMBER
+  public :: group_row, key_row, has_word, count_words, word_at, listed
+
+  integer, parameter :: KIND_REAL = 1
+  integer, parameter :: KIND_INTEGER = 2
+  !> One word of `choices`, in any case.
+  integer, parameter :: KIND_WORD = 3
+  !> Letters, digits, `_`, `-` and `.`; used in labels and to refer to a material.
+  integer, parameter :: KIND_NAME = 4
+  !> Any text.
+  integer, parameter :: KIND_TEXT = 5
+
+  !> `size` of a key that takes a list of one or more values.
+  integer, parameter :: ANY_NUMBER = 0
+
+  type :: group_t
+    character(len=16) :: name
+    character(len=128) :: meaning
+    logical :: required = .false.
+    logical :: repeatable = .false.
+    !> Group without which this one makes no sense.
+    character(len=16) :: needs = ''
+  end type group_t
+
+  type :: key_t
+    character(len=16) :: group
+    character(len=20) :: name
+    integer :: kind
+    character(len=8) :: unit = ''
+    !> Value of a key that is not given, as in a case file but without quotes; lists with blanks.
+    character(len=24) :: default = ''
+    !> The same for a run without &random_field, where it differs.
+    character(len=24) :: default_deterministic = ''
+    !> Value shown by `--defaults` where there is no default (the paper's case).
+    character(len=64) :: example = ''
+    !> Interval of numbers: '[' and ']' include the bound, '(' and ')' exclude it; a missing bound
+    !> is no bound.
+    character(len=24) :: range = '(,)'
+    character(len=64) :: choices = ''
+    character(len=96) :: later = ''
+    !> Number of values, or ANY_NUMBER.
+    integer :: size = 1
+    !> Must be given wherever it applies.
+    logical :: required = .false.
+    !> Applies only where key `when` of the same group has one of the words `when_is`.
+    character(len=16) :: when = ''
+    character(len=64) :: when_is = ''
+    !> Does not apply where this key of the same group is given.
+    character(len=16) :: unless = ''
+    !> Group without which the key makes no sense.
+    character(len=16) :: needs = ''
+    !> Not required where this group gives the key of the same name.
+    character(len=16) :: supplied_by = ''
+    !> Results depend on it: a run is resumed only with the same value.
+    logical :: identity = .true.
+    character(len=192) :: meaning = ''
+  end type key_t
+
+  type(group_t), parameter :: GROUPS(*) = [ &
+    group_t('case', 'What the run is called', required=.true.), &
+    group_t('grid', 'Background grid of square cells and its four walls', required=.true.), &
+    group_t('material', 'A material; one group for each', required=.true., repeatable=.true.), &
+    group_t('body', 'A body filled with material points; one group for each', &
+    required=.true., repeatable=.true.), &
+    group_t('loading', 'Gravity, damping and the stress at the start'), &
+    group_t('solver', 'Discretisation in space and time', required=.true.), &
+    group_t('random_field', 'Random field of a material property; without this group the run '// &
+    'is deterministic'), &
+    group_t('monte_carlo', 'How many realizations, and when a run counts as good'), &
+    group_t('study', 'Every combination of the listed values is a case, with the same random '// &
+    'numbers in all', needs='random_field'), &
+    group_t('output', 'Where results go, and how many')]
+
+  type(key_t), parameter :: CASE_KEYS(*) = [ &
+    key_t('case', 'name', KIND_NAME, example='sand_collapse', required=.true., &
+    identity=.false., meaning='Short name of the run'), &
+    key_t('case', 'title', KIND_TEXT, identity=.false., meaning='One line for the report')]
+
+  character(len=*), parameter :: WALLS = 'fixed roller free'
+  character(len=*), parameter :: WALL_MEANING = 'fixed: nothing moves; roller: free to slide '// &
+    'along it; free: no condition; frictional: Coulomb friction'
+  character(len=*), parameter :: FRICTION_MEANING = 'Coulomb friction coefficient of this wall'
+
+  type(key_t), parameter :: GRID_KEYS(*) = [ &
+    key_t('grid', 'x_min', KIND_REAL, unit='m', default='0', meaning='Left edge'), &
+    key_t('grid', 'x_max', KIND_REAL, unit='m', example='20', required=.true., &
+    meaning='Right edge, a whole number of cells from x_min'), &
+    key_t('grid', 'y_min', KIND_REAL, unit='m', default='0', meaning='Lower edge'), &
+    key_t('grid', 'y_max', KIND_REAL, unit='m', example='6.25', required=.true., &
+    meaning='Upper edge, a whole number of cells from y_min'), &
+    key_t('grid', 'cell_size', KIND_REAL, unit='m', example='0.125', range='(0,)', &
+    required=.true., meaning='Side of a cell'), &
+    key_t('grid', 'left', KIND_WORD, default='roller', choices=WALLS, later='frictional', &
+    meaning='Wall at x_min. '//WALL_MEANING), &
+    key_t('grid', 'right', KIND_WORD, default='roller', choices=WALLS, later='frictional', &
+    meaning='Wall at x_max'), &
+    key_t('grid', 'bottom', KIND_WORD, default='fixed', choices=WALLS, later='frictional', &
+    meaning='Wall at y_min'), &
+    key_t('grid', 'top', KIND_WORD, default='free', choices=WALLS, later='frictional', &
+    meaning='Wall at y_max'), &
+    key_t('grid', 'left_friction', KIND_REAL, range='[0,)', example='0.5', required=.true., &
+    when='left', when_is='frictional', meaning=FRICTION_MEANING), &
+    key_t('grid', 'right_friction', KIND_REAL, range='[0,)', example='0.5', required=.true., &
+    when='right', when_is='frictional', meaning=FRICTION_MEANING), &
+    key_t('grid', 'bottom_friction', KIND_REAL, range='[0,)', example='0.5', required=.true., &
+    when='bottom', when_is='frictional', meaning=FRICTION_MEANING), &
+    key_t('grid', 'top_friction', KIND_REAL, range='[0,)', example='0.5', required=.true., &
+    when='top', when_is='frictional', meaning=FRICTION_MEANING)]
+
+  character(len=*), parameter :: FRICTIONAL_MODELS = 'mohr_coulomb drucker_prager'
+
+  type(key_t), parameter :: MATERIAL_KEYS(*) = [ &
+    key_t('material', 'name', KIND_NAME, example='sand', required=.true., &
+    meaning='Name that bodies and the random field refer to'), &
+    key_t('material', 'model', KIND_WORD, example='mohr_coulomb', required=.true., &
+    choices='linear_elastic mohr_coulomb', later='neo_hookean drucker_prager von_mises', &
+    meaning='Constitutive model'), &
+    key_t('material', 'density', KIND_REAL, unit='kg/m^3', example='1450', range='(0,)', &
+    required=.true., meaning='Density at the start'), &
+    key_t('material', 'young', KIND_REAL, unit='Pa', example='2.6e6', range='(0,)', &
+    required=.true., meaning='Young''s modulus'), &
+    key_t('material', 'poisson', KIND_REAL, unit='1', example='0.31', range='(-1,0.5)', &
+    required=.true., meaning='Poisson''s ratio'), &
+    key_t('material', 'friction_angle', KIND_REAL, unit='deg', example='35', range='[0,90)', &
+    required=.true., when='model', when_is=FRICTIONAL_MODELS, &
+    meaning='Angle of internal friction; equal to mean of &random_field where the field varies it'), &
+    key_t('material', 'dilation_angle', KIND_REAL, unit='deg', default='0', range='[0,90)', &
+    when='model', when_is=FRICTIONAL_MODELS, meaning='Dilation angle, at most friction_angle'), &
+    key_t('material', 'cohesion', KIND_REAL, unit='Pa', default='0', range='[0,)', &
+    when='model', when_is=FRICTIONAL_MODELS, meaning='Cohesion'), &
+    key_t('material', 'tension_strength', KIND_REAL, unit='Pa', default='0', range='[0,)', &
+    when='model', when_is=FRICTIONAL_MODELS, meaning='Cut-off of tensile stress'), &
+    key_t('material', 'cone', KIND_WORD, default='plane_strain', &
+    choices='plane_strain outer inner', when='model', when_is='drucker_prager', &
+    meaning='How the cone is fitted to the Mohr-Coulomb pyramid'), &
+    key_t('material', 'undrained_strength', KIND_REAL, unit='Pa', example='1e3', range='(0,)', &
+    required=.true., when='model', when_is='von_mises', meaning='Undrained shear strength')]
+
+  type(key_t), parameter :: BODY_KEYS(*) = [ &
+    key_t('body', 'name', KIND_NAME, example='column', required=.true., meaning='Name'), &
+    key_t('body', 'material', KIND_NAME, example='sand', required=.true., &
+    meaning='Name of its material'), &
+    key_t('body', 'shape', KIND_WORD, example='rectangle', required=.true., &
+    choices='rectangle disc polygon', later='points', meaning='Shape at the start'), &
+    key_t('body', 'x', KIND_REAL, unit='m', example='0', required=.true., when='shape', &
+    when_is='rectangle disc', meaning='Left edge of a rectangle, centre of a disc'), &
+    key_t('body', 'y', KIND_REAL, unit='m', example='0', required=.true., when='shape', &
+    when_is='rectangle disc', meaning='Lower edge of a rectangle, centre of a disc'), &
+    key_t('body', 'width', KIND_REAL, unit='m', example='5', range='(0,)', required=.true., &
+    when='shape', when_is='rectangle', meaning='Extent along x'), &
+    key_t('body', 'height', KIND_REAL, unit='m', example='5', range='(0,)', required=.true., &
+    when='shape', when_is='rectangle', meaning='Extent along y'), &
+    key_t('body', 'radius', KIND_REAL, unit='m', example='1', range='(0,)', required=.true., &
+    when='shape', when_is='disc', meaning='Radius'), &
+    key_t('body', 'vertices', KIND_REAL, unit='m', example='0 0 5 0 0 5', size=ANY_NUMBER, &
+    required=.true., when='shape', when_is='polygon', &
+    meaning='Corners x1, y1, x2, y2, ... in order, clockwise or not'), &
+    key_t('body', 'file', KIND_TEXT, example='points.csv', required=.true., when='shape', &
+    when_is='points', meaning='CSV file of material points'), &
+    key_t('body', 'points_per_cell', KIND_INTEGER, default='2', range='[1,10]', when='shape', &
+    when_is='rectangle disc polygon', meaning='Material points in a cell, along each direction'), &
+    key_t('body', 'velocity', KIND_REAL, unit='m/s', default='0 0', size=2, &
+    meaning='Velocity at the start: x, y')]
+
+  type(key_t), parameter :: LOADING_KEYS(*) = [ &
+    key_t('loading', 'gravity', KIND_REAL, unit='m/s^2', default='0 -9.81', size=2, &
+    meaning='Acceleration of gravity: x, y'), &
+    key_t('loading', 'damping', KIND_REAL, unit='1/s', default='0', range='[0,)', &
+    meaning='Coefficient c_d of the force -c_d m v on the nodes (Eq. 14 of the paper)'), &
+    key_t('loading', 'initial_stress', KIND_WORD, default='none', choices='none geostatic', &
+    meaning='none: gravity is switched on; geostatic: in balance with gravity, within the yield '// &
+    'surface')]
+
+  type(key_t), parameter :: SOLVER_KEYS(*) = [ &
+    key_t('solver', 'weighting', KIND_WORD, default='gimp', choices='linear gimp', &
+    later='cpgimp bspline', meaning='Weighting function of a point; gimp is uGIMP'), &
+    key_t('solver', 'scheme', KIND_WORD, default='musl', choices='usf usl musl', &
+    meaning='When stress is updated: first, last, or last with momentum mapped anew'), &
+    key_t('solver', 'flip', KIND_REAL, unit='1', default='1', range='[0,1]', &
+    meaning='Share of FLIP in the velocity update; the rest is PIC'), &
+    key_t('solver', 'time_step', KIND_REAL, unit='s', example='1e-3', range='(0,)', &
+    meaning='Fixed time step; without it the step follows from cfl'), &
+    key_t('solver', 'cfl', KIND_REAL, unit='1', default='0.4', range='(0,1.5]', &
+    unless='time_step', &
+    meaning='Time step as a share of the time that a wave or a point needs to cross a cell'), &
+    key_t('solver', 'end_time', KIND_REAL, unit='s', example='5', range='(0,)', required=.true., &
+    meaning='Time at which a run ends, at the latest'), &
+    key_t('solver', 'settle', KIND_REAL, unit='1', default='1e-4', range='[0,1)', &
+    meaning='End as soon as kinetic energy stays below this share of its peak; 0: never')]
+
+  type(key_t), parameter :: RANDOM_FIELD_KEYS(*) = [ &
+    key_t('random_field', 'property', KIND_WORD, default='friction_angle', &
+    choices='friction_angle', later='density young poisson dilation_angle cohesion '// &
+    'tension_strength undrained_strength', meaning='Property that varies'), &
+    key_t('random_field', 'material', KIND_NAME, example='sand', required=.true., &
+    meaning='Name of the material whose property varies'), &
+    key_t('random_field', 'distribution', KIND_WORD, default='normal', &
+    choices='normal lognormal', later='beta gamma gumbel uniform weibull', &
+    meaning='Marginal distribution'), &
+    key_t('random_field', 'mean', KIND_REAL, unit='*', example='35', range='(0,)', &
+    required=.true., meaning='Mean before truncation, in the unit of the property'), &
+    key_t('random_field', 'cov', KIND_REAL, unit='1', example='0.05', range='(0,2]', &
+    required=.true., supplied_by='study', &
+    meaning='Coefficient of variation before truncation; cov of &study replaces it'), &
+    key_t('random_field', 'acf', KIND_WORD, example='snx', required=.true., &
+    choices='snx sqx smk csx bin', supplied_by='study', &
+    meaning='Autocorrelation function of Table 1 of the paper; acf of &study replaces it'), &
+    key_t('random_field', 'scale_x', KIND_REAL, unit='m', example='0.2', range='(0,)', &
+    required=.true., meaning='Scale of fluctuation along x'), &
+    key_t('random_field', 'scale_y', KIND_REAL, unit='m', example='0.2', range='(0,)', &
+    required=.true., meaning='Scale of fluctuation along y'), &
+    key_t('random_field', 'lower', KIND_REAL, unit='*', default='1', range='[0,)', &
+    meaning='Values below are set to it; the share of such points is reported'), &
+    key_t('random_field', 'upper', KIND_REAL, unit='*', default='60', range='(0,)', &
+    meaning='Values above are set to it'), &
+    key_t('random_field', 'method', KIND_WORD, default='auto', &
+    choices='auto kronecker cholesky circulant', &
+    meaning='How fields are sampled; auto takes the cheapest exact one for the points')]
+
+  type(key_t), parameter :: MONTE_CARLO_KEYS(*) = [ &
+    key_t('monte_carlo', 'realizations', KIND_INTEGER, example='100', range='[1,1000000000]', &
+    required=.true., needs='random_field', identity=.false., &
+    meaning='Realizations of each case, in total: a resumed run may ask for more'), &
+    key_t('monte_carlo', 'seed', KIND_INTEGER, default='2022', range='[0,)', &
+    meaning='First word of the key of the random numbers (Philox4x64-10)'), &
+    key_t('monte_carlo', 'stop_rule', KIND_WORD, default='count', choices='count', &
+    later='precision successive', needs='random_field', identity=.false., &
+    meaning='When to end a case: after all realizations, or earlier'), &
+    key_t('monte_carlo', 'noise_members', KIND_INTEGER, default='8', default_deterministic='1', &
+    range='[1,1000000]', identity=.false., &
+    meaning='Runs of the homogeneous case: one as given, the others with perturbations that '// &
+    'mean nothing, whose spread is the noise floor'), &
+    key_t('monte_carlo', 'max_failed_fraction', KIND_REAL, unit='1', default='0.01', &
+    range='[0,1]', identity=.false., &
+    meaning='Share of failed members from which on the program ends with exit code 4'), &
+    key_t('monte_carlo', 'member_seconds', KIND_REAL, unit='s', default='0', range='[0,)', &
+    identity=.false., meaning='Wall clock limit of one member; 0: none')]
+
+  type(key_t), parameter :: STUDY_KEYS(*) = [ &
+    key_t('study', 'acf', KIND_WORD, example='snx sqx', size=ANY_NUMBER, &
+    choices='snx sqx smk csx bin', meaning='Autocorrelation functions'), &
+    key_t('study', 'cov', KIND_REAL, unit='1', example='0.05 0.10', range='(0,2]', &
+    size=ANY_NUMBER, meaning='Coefficients of variation')]
+
+  type(key_t), parameter :: OUTPUT_KEYS(*) = [ &
+    key_t('output', 'directory', KIND_TEXT, default='runs/<name>', identity=.false., &
+    meaning='Directory of the results, made if it is not there; <name> is name of &case'), &
+    key_t('output', 'snapshot_interval', KIND_REAL, unit='s', default='0', range='[0,)', &
+    identity=.false., meaning='Time between snapshots of a deterministic or replayed run; 0: none'), &
+    key_t('output', 'history_interval', KIND_REAL, unit='s', default='0', range='[0,)', &
+    identity=.false., meaning='Time between rows of the history of such a run; 0: none'), &
+    key_t('output', 'snapshot_members', KIND_INTEGER, range='[1,1000000000]', &
+    size=ANY_NUMBER, example='1', needs='random_field', identity=.false., &
+    meaning='Realizations whose first and last state is written during a sweep'), &
+    key_t('output', 'report_seconds', KIND_REAL, unit='s', default='10', range='(0,)', &
+    identity=.false., meaning='Wall clock time between two progress lines')]
+
+  type(key_t), parameter :: KEYS(*) = [CASE_KEYS, GRID_KEYS, MATERIAL_KEYS, BODY_KEYS, &
+    LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, MONTE_CARLO_KEYS, STUDY_KEYS, OUTPUT_KEYS]
+
+contains
+
+  !> Row of a group in GROUPS (name in lower case), 0 for an unknown one.
+  pure integer function group_row(name) result(row)
+    character(len=*), intent(in) :: name
+
+    do row = size(GROUPS), 1, -1
+      if (GROUPS(row)%name == name) return
+    end do
+  end function group_row
+
+  !> Row of a key in KEYS (names in lower case), 0 for an unknown one.
+  pure integer function key_row(group, name) result(row)
+    character(len=*), intent(in) :: group, name
+
+    do row = size(KEYS), 1, -1
+      if (KEYS(row)%group == group .and. KEYS(row)%name == name) return
+    end do
+  end function key_row
+
+  !> Number of words in a text of words between blanks.
+  pure integer function count_words(text) result(number)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    number = 0
+    do i = 1, len_trim(text)
+      if (text(i:i) == ' ') cycle
+      if (i == 1) then
+        number = number + 1
+      else if (text(i - 1:i - 1) == ' ') then
+        number = number + 1
+      end if
+    end do
+  end function count_words
+
+  !> Word `number` of a text of words between blanks; empty beyond the last.
+  pure function word_at(text, number) result(word)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: number
+    character(len=:), allocatable :: word
+    integer :: i, start, length
+
+    start = 1
+    word = ''
+    do i = 1, number
+      length = verify(text(start:), ' ') - 1
+      if (length < 0) then
+        word = ''
+        return
+      end if
+      start = start + length
+      length = index(text(start:)//' ', ' ') - 1
+      word = text(start:start + length - 1)
+      start = start + length
+    end do
+  end function word_at
+
+  pure logical function has_word(text, word)
+    character(len=*), intent(in) :: text, word
+
+    has_word = len_trim(word) > 0 .and. index(' '//trim(text)//' ', ' '//trim(word)//' ') > 0
+  end function has_word
+
+  !> Words between blanks as a list with commas.
+  pure function listed(words) result(list)
+    character(len=*), intent(in) :: words
+    character(len=:), allocatable :: list
+    integer :: i
+
+    list = word_at(words, 1)
+    do i = 2, count_words(words)
+      list = list//', '//word_at(words, i)
+    end do
+  end function listed
+end module sg_schema
