@@ -48,7 +48,7 @@ contains
       end if
     end if
     if (allocated(error)) then
-      if (comm%rank() == 0) write (error_unit, '(a)') 'sgimp: '//error%message
+      if (comm%rank() == 0) call complain(options%case_file, error%message)
       exit_code = error%code
       if (exit_code == EXIT_OK) exit_code = EXIT_INTERNAL
     end if
@@ -125,6 +125,17 @@ contains
     call estimate_text(config, plan, text, error)
     if (.not. allocated(error)) call say(comm, text)
   end subroutine say_estimate
+
+  !> On standard error. Faults of a case file begin with its name, as compilers have it; others with the program's.
+  subroutine complain(case_file, message)
+    character(len=*), intent(in) :: case_file, message
+
+    if (case_file /= '' .and. index(message, case_file//':') == 1) then
+      write (error_unit, '(a)') message
+    else
+      write (error_unit, '(a)') 'sgimp: '//message
+    end if
+  end subroutine complain
 
   !> On standard output, once.
   subroutine say(comm, text)

@@ -64,7 +64,7 @@ contains
     call move_faults(faults, scanner%faults)
     if (len(text) >= 3) then
       ! Byte order mark.
-      if (text(1:3) == achar(239)//achar(187)//achar(191)) scanner%position = 4
+      if (text(1:3) == char(239)//char(187)//char(191)) scanner%position = 4
     end if
     closed = ''
     closed_line = 0
