@@ -15,6 +15,8 @@ module sg_hdf5_file
 
   public :: hdf5_file_t
 
+  !> Local buffers whose address alone is handed on are volatile: gfortran 12 drops stores to them.
+  !>
   !> Errors are kept and told by `close`, so that a file is written without a test in every line;
   !> after the first one, the other calls do nothing.
   type :: hdf5_file_t
@@ -166,7 +168,7 @@ contains
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: values(:)
     character(len=*), intent(in), optional :: units
-    character(kind=c_char, len=1), allocatable, target :: chars(:)
+    character(kind=c_char, len=1), allocatable, target, volatile :: chars(:)
     integer(hid_t) :: kind
     integer :: i, j, length
 
@@ -191,7 +193,7 @@ contains
     character(len=*), intent(in) :: name
     real(wp), intent(in) :: value
     character(len=*), intent(in), optional :: units
-    real(wp), target :: copy(1)
+    real(wp), target, volatile :: copy(1)
     integer :: none(0)
 
     copy = value
@@ -204,7 +206,7 @@ contains
     integer(hid_t), intent(in) :: kind
     !> As in Fortran; size 0 for a scalar.
     integer, intent(in) :: extents(:)
-    type(c_ptr), intent(in) :: address
+    type(c_ptr), value :: address
     character(len=*), intent(in), optional :: units
     integer(hid_t) :: space, dataset
     integer :: status, ignored
@@ -260,7 +262,7 @@ contains
   subroutine attribute_text(this, path, name, value)
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name, value
-    character(kind=c_char, len=1), allocatable, target :: chars(:)
+    character(kind=c_char, len=1), allocatable, target, volatile :: chars(:)
     integer(hid_t) :: kind
     integer :: i
 
@@ -280,7 +282,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     integer(i4), intent(in) :: value
-    integer(i4), target :: copy
+    integer(i4), target, volatile :: copy
 
     copy = value
     call write_attribute(this, path, name, h5kind_to_type(i4, H5_INTEGER_KIND), c_loc(copy))
@@ -290,7 +292,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     integer(i8), intent(in) :: value
-    integer(i8), target :: copy
+    integer(i8), target, volatile :: copy
 
     copy = value
     call write_attribute(this, path, name, h5kind_to_type(i8, H5_INTEGER_KIND), c_loc(copy))
@@ -300,7 +302,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     real(wp), intent(in) :: value
-    real(wp), target :: copy
+    real(wp), target, volatile :: copy
 
     copy = value
     call write_attribute(this, path, name, h5kind_to_type(wp, H5_REAL_KIND), c_loc(copy))
@@ -310,7 +312,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     integer(hid_t), intent(in) :: kind
-    type(c_ptr), intent(in) :: address
+    type(c_ptr), value :: address
     integer(hid_t) :: object, space, attribute
     integer :: status
 

@@ -120,9 +120,21 @@ contains
     call file%set('/', 'config_hash', record%config_hash)
     call file%set('/', 'state', record%state)
     call file%set('/', 'realizations', int(record%realizations, i4))
-    call file%set('/', 'namelist', record%case_text)
-    call file%set('/', 'resolved_namelist', record%resolved)
+    call set_text(file, 'namelist', record%case_text)
+    call set_text(file, 'resolved_namelist', record%resolved)
   end subroutine write_provenance
+
+  !> An attribute of the root or, where the text is too long for one (64 KiB), a dataset there.
+  subroutine set_text(file, name, text)
+    type(hdf5_file_t), intent(inout) :: file
+    character(len=*), intent(in) :: name, text
+
+    if (len(text) < 60000) then
+      call file%set('/', name, text)
+    else
+      call file%write('/'//name, [text])
+    end if
+  end subroutine set_text
 
   subroutine write_geometry(file, record)
     type(hdf5_file_t), intent(inout) :: file
@@ -167,7 +179,7 @@ contains
     do i = 1, COLUMN_COUNT
       call write_column(file, group, i, results%values(i, rows))
     end do
-    call file%write(group//'/reason', results%reason(rows), '')
+    call file%write(group//'/reason', results%reason(rows), '1')
     call file%make_group(group//'/profile')
     call file%write(group//'/profile/x', profile_x, 'm')
     call file%write(group//'/profile/height', results%height(:, rows), 'm')
