@@ -52,6 +52,8 @@ module sg_simulation
   !> The clock of a simulation and what it remembers of the past.
   type :: clock_t
     integer :: step = 0
+    !> Step that the observer was last shown.
+    integer :: shown_step = -1
     real(wp) :: time = 0.0_wp, time_step = 0.0_wp
     real(wp) :: peak_energy = 0.0_wp, calm_since = 0.0_wp, calm_needed = 0.0_wp, &
       speed_limit = 0.0_wp
@@ -80,7 +82,7 @@ contains
     started = wall_seconds()
     call prepare(config, scene, variation, observer, solver)
     call start_clock(config, scene, solver, clock)
-    if (observer%wants_ends) call observer%note_state(0, 0.0_wp, solver%particles)
+    if (observer%wants_ends) call show_state(solver, observer, clock)
     call watch(config, solver, observer, clock)
     steps_per_question = max(1, POINTS_PER_QUESTION/solver%particles%count)
     do while (clock%time < config%solver%end_time .and. .not. clock%settled)
@@ -96,7 +98,7 @@ contains
       if (outcome%status /= STATUS_OK) exit
     end do
     if (outcome%status == STATUS_ABANDONED) return
-    if (observer%wants_ends) call observer%note_state(clock%step, clock%time, solver%particles)
+    if (observer%wants_ends) call show_state(solver, observer, clock)
     outcome%values(STEPS) = clock%step
     if (outcome%status == STATUS_OK) call measure(config, scene, solver, clock, outcome)
     outcome%values(SECONDS) = wall_seconds() - started
@@ -266,13 +268,22 @@ contains
         + 1)*observer%history_interval
     end if
     if (observer%snapshot_interval > 0.0_wp .and. clock%time >= clock%next_snapshot) then
-      if (.not. (observer%wants_ends .and. clock%step == 0)) then
-        call observer%note_state(clock%step, clock%time, solver%particles)
-      end if
-      clock%next_snapshot = (floor(clock%time/observer%snapshot_interval) &
-        + 1)*observer%snapshot_interval
+      call show_state(solver, observer, clock)
+      clock%next_snapshot = (floor(clock%time/observer%snapshot_interval) + 1)* &
+        observer%snapshot_interval
     end if
   end subroutine watch
+
+  !> Shows the present state to the observer, unless it has seen it.
+  subroutine show_state(solver, observer, clock)
+    type(solver_t), intent(in) :: solver
+    class(observer_t), intent(inout) :: observer
+    type(clock_t), intent(inout) :: clock
+
+    if (clock%shown_step == clock%step) return
+    call observer%note_state(clock%step, clock%time, solver%particles)
+    clock%shown_step = clock%step
+  end subroutine show_state
 
   function history_row(config, solver, clock) result(row)
     type(config_t), intent(in) :: config
@@ -322,7 +333,7 @@ contains
       v(HEIGHT_MAX) = surface_height(s, -huge(1.0_wp), huge(1.0_wp), g%y_min) - g%y_min
       v(HEIGHT_WALL) = surface_height(s, scene%extent(1), scene%extent(1) + cell, g%y_min) - g%y_min
       v(SETTLED) = merge(1.0_wp, 0.0_wp, clock%settled)
-      v(SETTLE_TIME) = clock%calm_since
+      if (clock%settled) v(SETTLE_TIME) = clock%calm_since
       v(KINETIC_ENERGY_END) = solver%tally%motion_energy
       v(KINETIC_ENERGY_RATIO) = solver%tally%motion_energy/max(clock%peak_energy, tiny(1.0_wp))
       touched = scene%extent(2) < g%x_max - cell .and. v(RUNOUT_MAX) + scene%toe > g%x_max - cell
