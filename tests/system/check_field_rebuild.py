@@ -1,6 +1,6 @@
 """Any member's random field can be rebuilt from the seed and its id alone, without the program.
 
-    check_field_rebuild.py PROGRAM     # the sgimp executable
+    check_field_rebuild.py --sgimp PROGRAM
 
 Runs small cases with snapshots and compares the friction angles in them with fields made here by
 NumPy's Philox, SciPy's normal quantile and NumPy's Cholesky factors and Fourier transform.
@@ -29,7 +29,7 @@ CASES = (
 NAMELIST = """
 &case name='rebuild' /
 &grid x_min=0, x_max=4, y_min=0, y_max=2, cell_size=0.25 /
-&material name='sand', model='mohr_coulomb', density=1450, young=2.6e6, poisson=0.31, friction_angle=35 /
+&material name='sand', model='mohr_coulomb', density=1450, young=2.6e6, poisson=0.31, friction_angle={mean} /
 &body name='column', material='sand', shape='rectangle', x=0, y=0, width=2, height=1.5, points_per_cell=2 /
 &loading gravity=0,-9.81, damping=0.4 /
 &solver end_time=0.01 /
@@ -158,8 +158,8 @@ def check_case(program, directory, case):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("program", help="the sgimp executable")
-    program = Path(parser.parse_args().program).resolve()
+    parser.add_argument("--sgimp", required=True, help="the sgimp executable")
+    program = Path(parser.parse_args().sgimp).resolve()
     with tempfile.TemporaryDirectory() as directory:
         faults = sum(check_case(program, Path(directory) / f"case_{k}", case) for k, case in enumerate(CASES))
     sys.exit(1 if faults else 0)
