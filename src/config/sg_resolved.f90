@@ -6,7 +6,7 @@ module sg_resolved
   use sg_config_fields, only: config_visitor_t, visit_config
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_kinds, only: i8, wp
-  use sg_namelist, only: namelist_t, nml_entry_t, nml_value_t
+  use sg_namelist, only: namelist_t, nml_entry_t
   use sg_number_text, only: range_holds
   use sg_read_config, only: read_config
   use sg_schema, only: key_row, KEYS, KIND_INTEGER, KIND_REAL
@@ -22,6 +22,7 @@ module sg_resolved
     character(len=16) :: group_name = ''
   contains
     procedure :: take
+    procedure :: take_one
     procedure :: begin_group
     procedure :: visit_real
     procedure :: visit_pair
@@ -36,7 +37,8 @@ module sg_resolved
 
 contains
 
-  !> A complete case file: every key that applies, one a line; reading it gives the same configuration
+  !> A complete case file: every key that applies, one a line; reading it gives the same
+  !> configuration
   !> to the last bit.
   function resolved_text(config) result(text)
     type(config_t), intent(in) :: config
@@ -116,7 +118,8 @@ contains
     end do
   end subroutine compare_configs
 
-  !> Compares group `g` of `here` with group `o` of `there` (0: not there). `backwards`: `here` is the
+  !> Compares group `g` of `here` with group `o` of `there` (0: not there). `backwards`: `here` is
+  !> the
   !> new file, and only what the old one has not got is of interest.
   subroutine compare_groups(here, g, there, o, backwards, differences)
     type(namelist_t), intent(in) :: here, there
@@ -207,7 +210,8 @@ contains
   subroutine take(this, key, values)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
-    type(nml_value_t), intent(in) :: values(:)
+    !> Blanks at the end do not count.
+    character(len=*), intent(in) :: values(:)
     integer :: row, i
 
     row = key_row(this%group_name, key)
@@ -216,11 +220,22 @@ contains
       if (len(why_not(this%nml, group, KEYS(row))) > 0) return
       call group%add_entry(key, 0)
       do i = 1, size(values)
-        call group%entries(group%number)%add_value(values(i)%text, &
+        call group%entries(group%number)%add_value(trim(values(i)), &
           KEYS(row)%kind /= KIND_REAL .and. KEYS(row)%kind /= KIND_INTEGER, 0)
       end do
     end associate
   end subroutine take
+
+  !> A value of its own. (No array constructor around a text of deferred length: gfortran 12 frees
+  !> it twice.)
+  subroutine take_one(this, key, value)
+    class(writer_t), intent(inout) :: this
+    character(len=*), intent(in) :: key, value
+    character(len=len(value)) :: values(1)
+
+    values(1) = value
+    call this%take(key, values)
+  end subroutine take_one
 
   subroutine visit_real(this, key, value)
     class(writer_t), intent(inout) :: this
@@ -232,24 +247,31 @@ contains
     ! A key without default that is not required and out of its range has not been given.
     if (.not. KEYS(row)%required .and. len_trim(KEYS(row)%default) == 0 .and. &
       .not. range_holds(KEYS(row)%range, value)) return
-    call this%take(key, [nml_value_t(to_text(value))])
+    call this%take_one(key, to_text(value))
   end subroutine visit_real
 
   subroutine visit_pair(this, key, value)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
     real(wp), intent(inout) :: value(2)
+    character(len=32) :: texts(2)
 
-    call this%take(key, [nml_value_t(to_text(value(1))), nml_value_t(to_text(value(2)))])
+    texts(1) = to_text(value(1))
+    texts(2) = to_text(value(2))
+    call this%take(key, texts)
   end subroutine visit_pair
 
   subroutine visit_reals(this, key, value)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
     real(wp), allocatable, intent(inout) :: value(:)
+    character(len=32) :: texts(size(value))
     integer :: i
 
-    call this%take(key, [(nml_value_t(to_text(value(i))), i=1, size(value))])
+    do i = 1, size(value)
+      texts(i) = to_text(value(i))
+    end do
+    call this%take(key, texts)
   end subroutine visit_reals
 
   subroutine visit_integer(this, key, value)
@@ -257,7 +279,7 @@ contains
     character(len=*), intent(in) :: key
     integer, intent(inout) :: value
 
-    call this%take(key, [nml_value_t(to_text(value))])
+    call this%take_one(key, to_text(value))
   end subroutine visit_integer
 
   subroutine visit_long(this, key, value)
@@ -265,16 +287,20 @@ contains
     character(len=*), intent(in) :: key
     integer(i8), intent(inout) :: value
 
-    call this%take(key, [nml_value_t(to_text(value))])
+    call this%take_one(key, to_text(value))
   end subroutine visit_long
 
   subroutine visit_integers(this, key, value)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
     integer, allocatable, intent(inout) :: value(:)
+    character(len=32) :: texts(size(value))
     integer :: i
 
-    call this%take(key, [(nml_value_t(to_text(value(i))), i=1, size(value))])
+    do i = 1, size(value)
+      texts(i) = to_text(value(i))
+    end do
+    call this%take(key, texts)
   end subroutine visit_integers
 
   subroutine visit_word(this, key, value)
@@ -282,16 +308,15 @@ contains
     character(len=*), intent(in) :: key
     character(len=*), intent(inout) :: value
 
-    call this%take(key, [nml_value_t(trim(value))])
+    call this%take_one(key, value)
   end subroutine visit_word
 
   subroutine visit_words(this, key, value)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
     character(len=*), allocatable, intent(inout) :: value(:)
-    integer :: i
 
-    call this%take(key, [(nml_value_t(trim(value(i))), i=1, size(value))])
+    call this%take(key, value)
   end subroutine visit_words
 
   subroutine visit_text(this, key, value)
@@ -299,6 +324,6 @@ contains
     character(len=*), intent(in) :: key
     character(len=:), allocatable, intent(inout) :: value
 
-    call this%take(key, [nml_value_t(value)])
+    call this%take_one(key, value)
   end subroutine visit_text
 end module sg_resolved
