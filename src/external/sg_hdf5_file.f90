@@ -112,7 +112,8 @@ contains
     real(wp), intent(in), target, contiguous :: values(:)
     character(len=*), intent(in), optional :: units
 
-    call write_raw(this, name, h5kind_to_type(wp, H5_REAL_KIND), shape(values), c_loc(values), units)
+    call write_raw(this, name, h5kind_to_type(wp, H5_REAL_KIND), shape(values), c_loc(values), &
+      units)
   end subroutine write_real_1
 
   subroutine write_real_2(this, name, values, units)
@@ -121,7 +122,8 @@ contains
     real(wp), intent(in), target, contiguous :: values(:, :)
     character(len=*), intent(in), optional :: units
 
-    call write_raw(this, name, h5kind_to_type(wp, H5_REAL_KIND), shape(values), c_loc(values), units)
+    call write_raw(this, name, h5kind_to_type(wp, H5_REAL_KIND), shape(values), c_loc(values), &
+      units)
   end subroutine write_real_2
 
   subroutine write_single_1(this, name, values, units)
@@ -130,7 +132,8 @@ contains
     real(sp), intent(in), target, contiguous :: values(:)
     character(len=*), intent(in), optional :: units
 
-    call write_raw(this, name, h5kind_to_type(sp, H5_REAL_KIND), shape(values), c_loc(values), units)
+    call write_raw(this, name, h5kind_to_type(sp, H5_REAL_KIND), shape(values), c_loc(values), &
+      units)
   end subroutine write_single_1
 
   subroutine write_single_2(this, name, values, units)
@@ -139,7 +142,8 @@ contains
     real(sp), intent(in), target, contiguous :: values(:, :)
     character(len=*), intent(in), optional :: units
 
-    call write_raw(this, name, h5kind_to_type(sp, H5_REAL_KIND), shape(values), c_loc(values), units)
+    call write_raw(this, name, h5kind_to_type(sp, H5_REAL_KIND), shape(values), c_loc(values), &
+      units)
   end subroutine write_single_2
 
   subroutine write_integer_1(this, name, values, units)

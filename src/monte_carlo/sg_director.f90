@@ -128,7 +128,8 @@ contains
       this%last_report - this%start, this%running_text())
   end subroutine report
 
-  !> Mean of the 99.5 % runout with its 95 % interval, in the study case that has come farthest, over
+  !> Mean of the 99.5 % runout with its 95 % interval, in the study case that has come farthest,
+  !> over
   !> its ids without a gap.
   function running_text(this) result(text)
     class(ensemble_director_t), intent(in) :: this

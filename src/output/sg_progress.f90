@@ -1,5 +1,6 @@
 !> What people and programs read while a run goes on: lines on the screen and in DIR/run.log, and
-!> events in DIR/events.jsonl. Both files are opened for each line, so that nothing is lost by a kill;
+!> events in DIR/events.jsonl. Both files are opened for each line, so that nothing is lost by a
+!> kill;
 !> lines follow time, not steps.
 module sg_progress
   use, intrinsic :: iso_fortran_env, only: output_unit
