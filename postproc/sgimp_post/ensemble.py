@@ -1,0 +1,262 @@
+"""Reads `ensemble.h5` into plain arrays. Knows the names in the file and nothing of statistics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Optional
+
+import h5py
+import numpy as np
+
+from .errors import PostError
+
+FILE_NAME = "ensemble.h5"
+
+#: The four definitions of runout, from the initial toe, with the words used for them.
+RUNOUTS = {
+    "runout_max": "farthest point",
+    "runout_q995": "99.5 % of the mass",
+    "runout_q99": "99 % of the mass",
+    "runout_connected": "connected deposit",
+}
+
+#: As `status_text` of the program.
+STATUS_TEXTS = {
+    0: "ok",
+    1: "not finite",
+    2: "point lost",
+    3: "time step collapsed",
+    4: "time limit",
+    5: "runaway speed",
+    6: "field failed",
+}
+
+INTEGER_COLUMNS = ("settled", "wall_touched", "steps", "failure_step", "failure_point")
+FLOAT_COLUMNS = (
+    *RUNOUTS,
+    "height_max",
+    "height_wall",
+    "settle_time",
+    "kinetic_energy_end",
+    "kinetic_energy_ratio",
+    "energy_error",
+    "mass_error",
+    "field_mean",
+    "field_min",
+    "field_max",
+    "field_clipped",
+    "seconds",
+    "failure_x",
+    "failure_y",
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """The members of one study case, one array entry a member, sorted by id."""
+
+    label: str
+    acf: str
+    cov: float
+    mean: float
+    distribution: str
+    scale_x: float
+    scale_y: float
+    is_homogeneous: bool
+    planned: int
+    order: int
+    id: np.ndarray
+    status: np.ndarray
+    columns: dict
+    units: dict
+    reason: list
+    #: Cell centres [nx] and deposit depth [N, nx], in m; both None if not in the file.
+    profile_x: Optional[np.ndarray] = None
+    profile_height: Optional[np.ndarray] = None
+
+    @property
+    def count(self) -> int:
+        return len(self.id)
+
+    @property
+    def ok(self) -> np.ndarray:
+        """Mask of the members that did not fail."""
+        return self.status == 0
+
+    @property
+    def failed(self) -> np.ndarray:
+        return self.status != 0
+
+    def column(self, name: str) -> np.ndarray:
+        return self.columns[name]
+
+    def values(self, name: str) -> np.ndarray:
+        """Finite values of the members that did not fail, in order of id."""
+        column = self.columns[name][self.ok]
+        return column[np.isfinite(column)]
+
+    def select(self, keep: np.ndarray) -> Case:
+        """The same case with some of its rows."""
+        return replace(
+            self,
+            id=self.id[keep],
+            status=self.status[keep],
+            columns={name: values[keep] for name, values in self.columns.items()},
+            reason=[text for text, kept in zip(self.reason, keep) if kept],
+            profile_height=None if self.profile_height is None else self.profile_height[keep],
+        )
+
+    def prefix(self) -> Case:
+        """Rows 1, 2, ..., k without a gap. In an unfinished run the members that are still missing
+        are the slow ones; what comes after the first of them is a biased draw."""
+        return self.select(self.id == np.arange(1, self.count + 1))
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Where the body stood and how large the grid is, in m; None if the file does not say."""
+
+    toe: Optional[float] = None
+    initial_height: Optional[float] = None
+    initial_width: Optional[float] = None
+    x_min: Optional[float] = None
+    x_max: Optional[float] = None
+    y_min: Optional[float] = None
+    y_max: Optional[float] = None
+    cell_size: Optional[float] = None
+    point_spacing: Optional[float] = None
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    directory: Path
+    attributes: dict
+    geometry: Geometry
+    #: Every row in the file, in the order of the plan.
+    cases: list = field(default_factory=list)
+
+    @property
+    def state(self) -> str:
+        return str(self.attributes.get("state", "unknown"))
+
+    @property
+    def is_complete(self) -> bool:
+        return self.state == "complete"
+
+    def for_statistics(self) -> list:
+        """The cases with the rows that statistics may use: all of a complete run, else the
+        contiguous prefix of each case."""
+        return list(self.cases) if self.is_complete else [case.prefix() for case in self.cases]
+
+
+def read_ensemble(directory: Path) -> Ensemble:
+    """Reads DIR/ensemble.h5. Raises PostError, naming the file, on anything that is not one."""
+    directory = Path(directory)
+    if not directory.exists():
+        raise PostError(f"{directory}: no such directory")
+    if not directory.is_dir():
+        raise PostError(f"{directory}: not a directory (give the output directory of a run)")
+    path = directory / FILE_NAME
+    if not path.is_file():
+        raise PostError(f"{directory}: no {FILE_NAME} here (is it the output directory of a run?)")
+    try:
+        with h5py.File(path, "r") as file:
+            return _read_file(directory, path, file)
+    except PostError:
+        raise
+    except (OSError, KeyError, ValueError, RuntimeError, TypeError) as cause:
+        words = " ".join(str(cause).split())
+        raise PostError(f"{path}: cannot be read ({words})") from cause
+
+
+def _read_file(directory: Path, path: Path, file: h5py.File) -> Ensemble:
+    attributes = {name: _plain(value) for name, value in file.attrs.items()}
+    if attributes.get("program") != "sgimp" or "cases" not in file:
+        raise PostError(f"{path}: not a results file of sgimp (no program='sgimp' or no /cases)")
+    geometry = Geometry()
+    if "geometry" in file:
+        known = {name: float(value) for name, value in file["geometry"].attrs.items()
+                 if name in Geometry.__dataclass_fields__}
+        geometry = Geometry(**known)
+    cases = [_read_case(path, label, group) for label, group in file["cases"].items()]
+    cases.sort(key=lambda case: (case.order, case.label))
+    return Ensemble(directory, attributes, geometry, cases)
+
+
+def _read_case(path: Path, label: str, group: h5py.Group) -> Case:
+    for name in ("id", "status"):
+        if name not in group:
+            raise PostError(f"{path}: case {label} has no dataset {name}")
+    ids = group["id"][...].astype(np.int64).reshape(-1)
+    count = len(ids)
+    order = np.argsort(ids, kind="stable")
+    columns, units = {}, {}
+    for name in (*FLOAT_COLUMNS, *INTEGER_COLUMNS):
+        is_integer = name in INTEGER_COLUMNS
+        if name in group:
+            values = _column(path, label, group[name], count)
+            units[name] = str(_plain(group[name].attrs.get("units", "")))
+        else:
+            values = np.full(count, -1 if is_integer else np.nan)
+            units[name] = ""
+        columns[name] = values.astype(np.int64 if is_integer else np.float64)[order]
+    reason = [""] * count
+    if "reason" in group:
+        reason = [_plain(text) for text in _column(path, label, group["reason"], count)]
+    x, height = _read_profile(path, label, group, count)
+    attributes = {name: _plain(value) for name, value in group.attrs.items()}
+    return Case(
+        label=label,
+        acf=str(attributes.get("acf", "")).lower(),
+        cov=float(attributes.get("cov", np.nan)),
+        mean=float(attributes.get("mean", np.nan)),
+        distribution=str(attributes.get("distribution", "")),
+        scale_x=float(attributes.get("scale_x", np.nan)),
+        scale_y=float(attributes.get("scale_y", np.nan)),
+        is_homogeneous=bool(attributes.get("is_homogeneous", label == "deterministic")),
+        planned=int(attributes.get("planned", count)),
+        order=int(attributes.get("order", 0)),
+        id=ids[order],
+        status=_column(path, label, group["status"], count).astype(np.int64)[order],
+        columns=columns,
+        units=units,
+        reason=[reason[k] for k in order],
+        profile_x=x,
+        profile_height=None if height is None else height[order],
+    )
+
+
+def _column(path: Path, label: str, dataset: h5py.Dataset, count: int) -> np.ndarray:
+    values = dataset[...].reshape(-1)
+    if len(values) != count:
+        raise PostError(f"{path}: case {label}: {len(values)} rows of "
+                        f"{dataset.name.rsplit('/', 1)[-1]} for {count} members")
+    return values
+
+
+def _read_profile(path: Path, label: str, group: h5py.Group, count: int):
+    if "profile" not in group or not {"x", "height"} <= set(group["profile"]):
+        return None, None
+    x = group["profile/x"][...].astype(np.float64).reshape(-1)
+    height = group["profile/height"][...].astype(np.float64)
+    if height.size == 0:
+        height = np.empty((0, len(x)))
+    if height.shape != (count, len(x)):
+        raise PostError(f"{path}: case {label}: profile/height has shape {height.shape}, "
+                        f"expected {(count, len(x))}")
+    return x, height
+
+
+def _plain(value):
+    """Attribute values as Python's own; strings without the blanks Fortran pads with."""
+    if isinstance(value, np.ndarray):
+        value = value.reshape(-1)
+        if len(value) != 1:
+            return [_plain(item) for item in value]
+        value = value[0]
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if isinstance(value, str):
+        return value.rstrip("\x00 ")
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,296 @@
+"""The pictures of the report. One style; a fixed colour for each autocorrelation function."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from .ensemble import RUNOUTS
+from .fits import LAWS, distribution_of, fit_laws
+from .statistics import describe, exceedance, running
+
+#: Okabe and Ito's palette, told apart by colour-blind readers.
+ACF_COLOURS = {
+    "snx": "#D55E00",
+    "sqx": "#0072B2",
+    "smk": "#009E73",
+    "csx": "#CC79A7",
+    "bin": "#7A6A00",
+}
+LAW_STYLES = {
+    "normal": ("#0072B2", "-"),
+    "lognormal": ("#009E73", "--"),
+    "gumbel": ("#D55E00", "-"),
+    "weibull": ("#7F7F7F", ":"),
+}
+OTHER = "#3B5B7A"
+INK = "#22303C"
+STYLE = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.edgecolor": "#8795A1",
+    "axes.labelcolor": INK,
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E4E9ED",
+    "text.color": INK,
+    "xtick.color": "#52616B",
+    "ytick.color": "#52616B",
+    "legend.frameon": False,
+    "legend.fontsize": 8,
+    "figure.constrained_layout.use": True,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "sgimp",
+}
+
+
+def colour(case) -> str:
+    return ACF_COLOURS.get(case.acf, OTHER)
+
+
+def data_uri(figure, kind: str = "svg", dpi: int = 130) -> str:
+    """The figure as a data URI; closes it."""
+    buffer = io.BytesIO()
+    metadata = {"Date": None} if kind == "svg" else None
+    figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
+    plt.close(figure)
+    mime = {"svg": "image/svg+xml", "png": "image/png"}[kind]
+    return f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode('ascii')}"
+
+
+def styled(draw):
+    """Runs a drawing function under the style of the report."""
+
+    def inner(*args, **kwargs):
+        with matplotlib.rc_context(STYLE):
+            return draw(*args, **kwargs)
+
+    return inner
+
+
+@styled
+def case_figure(case, name: str, deterministic: dict):
+    """Histogram with the four laws, running mean and standard deviation, exceedance."""
+    values = case.values(name)
+    figure, axes = plt.subplots(1, 3, figsize=(11.5, 3.2))
+    _histogram(axes[0], values, colour(case), deterministic)
+    _running(axes[1], values, colour(case), deterministic)
+    _exceedance(axes[2], [case], name, deterministic)
+    for axis in (axes[0], axes[2]):
+        axis.set_xlabel(f"runout, {RUNOUTS[name]} [m]")
+    axes[0].set_title("Distribution")
+    axes[1].set_title("Convergence")
+    axes[2].set_title("Exceedance")
+    return figure
+
+
+def _mark_deterministic(axis, deterministic: dict, vertical: bool = True):
+    """The homogeneous mean with the noise floor, mean +- one standard deviation, as a band."""
+    mean, sd = deterministic["mean"], deterministic["sd"]
+    if not np.isfinite(mean):
+        return
+    line, span = (axis.axvline, axis.axvspan) if vertical else (axis.axhline, axis.axhspan)
+    line(mean, color=INK, lw=1.1, ls=(0, (4, 2)), label="homogeneous")
+    if np.isfinite(sd) and sd > 0:
+        span(mean - sd, mean + sd, color=INK, alpha=0.10, lw=0, label="noise floor ±1 sd")
+
+
+def _histogram(axis, values, tint, deterministic):
+    if len(values) == 0:
+        axis.text(0.5, 0.5, "no values yet", ha="center", transform=axis.transAxes)
+        return
+    bins = "fd" if len(values) >= 30 and np.ptp(values) > 0 else max(3, min(10, len(values) // 2))
+    axis.hist(values, bins=bins, density=True, color=tint, alpha=0.30, edgecolor="white")
+    axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
+    margin = 0.25 * max(np.ptp(values), 1e-3)
+    x = np.linspace(values.min() - margin, values.max() + margin, 300)
+    for fit in fit_laws(values):
+        if fit.note:
+            continue
+        shade, dash = LAW_STYLES[fit.law]
+        axis.plot(x, distribution_of(fit).pdf(x), color=shade, ls=dash, lw=1.4, label=LAWS[fit.law])
+    _mark_deterministic(axis, deterministic)
+    axis.set_ylabel("density [1/m]")
+    axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=3)
+
+
+def _running(axis, values, tint, deterministic):
+    curve = running(values)
+    if len(curve.count) == 0:
+        return
+    axis.fill_between(curve.count, curve.mean_low, curve.mean_high, color=tint, alpha=0.18, lw=0)
+    axis.plot(curve.count, curve.mean, color=tint, lw=1.5, label="mean, 95 %")
+    if np.isfinite(deterministic["mean"]):
+        axis.axhline(deterministic["mean"], color=INK, lw=1.1, ls=(0, (4, 2)))
+    final = describe(values)
+    room = 4.0 * (final.sd if np.isfinite(final.sd) and final.sd > 0 else 0.05)
+    axis.set_ylim(final.mean - room, final.mean + room)
+    axis.set_xlabel("realizations")
+    axis.set_ylabel("mean [m]")
+    twin = axis.twinx()
+    twin.grid(False)
+    twin.spines["right"].set_visible(True)
+    twin.fill_between(curve.count, curve.sd_low, curve.sd_high, color="#8795A1", alpha=0.15, lw=0)
+    twin.plot(curve.count, curve.sd, color="#52616B", lw=1.2, ls="--", label="sd, 95 % (right)")
+    if np.isfinite(final.sd):
+        twin.set_ylim(0, 3.5 * max(final.sd, 1e-6))
+    twin.set_ylabel("standard deviation [m]")
+    handles = axis.get_legend_handles_labels(), twin.get_legend_handles_labels()
+    axis.legend(
+        handles[0][0] + handles[1][0],
+        handles[0][1] + handles[1][1],
+        loc="upper left",
+        bbox_to_anchor=(0.0, -0.22),
+        ncol=2,
+    )
+
+
+def _exceedance(axis, cases, name, deterministic):
+    smallest = 1.0
+    for case in cases:
+        curve = exceedance(case.values(name))
+        if len(curve.x) == 0:
+            continue
+        drawn = curve.probability > 0
+        if drawn.any():
+            smallest = min(smallest, curve.probability[drawn].min())
+        tint = colour(case)
+        if len(cases) <= 3:
+            axis.fill_between(curve.x, np.maximum(curve.low, 1e-6), curve.high, color=tint, alpha=0.15, lw=0)
+        dash = {0.1: "--", 0.15: ":"}.get(round(case.cov, 3), "-")
+        axis.plot(curve.x[drawn], curve.probability[drawn], color=tint, ls=dash, lw=1.5, label=case.label)
+    axis.set_yscale("log")
+    axis.set_ylim(0.5 * smallest, 1.3)
+    axis.set_ylabel("P(runout > x), Wilson 95 %")
+    _mark_deterministic(axis, deterministic)
+    axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=2)
+
+
+@styled
+def comparison_figure(cases, name, deterministic):
+    """Exceedance of all cases in one axis."""
+    figure, axis = plt.subplots(figsize=(8.4, 4.2))
+    _exceedance(axis, cases, name, deterministic)
+    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axis.set_xlabel(f"runout, {RUNOUTS[name]} [m]")
+    return figure
+
+
+@styled
+def study_figure(summary: dict):
+    """Mean, standard deviation and exceedance probability against the coefficient of variation
+    (Figs. 13 and 14 of the paper), one line an autocorrelation function."""
+    name, floor = summary["primary"], summary["deterministic"][summary["primary"]]
+    figure, axes = plt.subplots(1, 3, figsize=(11.5, 3.3))
+    acfs = sorted({case["acf"] for case in summary["cases"]})
+    for k, acf in enumerate(acfs):
+        rows = sorted((case for case in summary["cases"] if case["acf"] == acf), key=lambda c: c["cov"])
+        x = np.array([row["cov"] for row in rows]) + 0.0012 * (k - 0.5 * (len(acfs) - 1))
+        for axis, value, low, high in (
+            (axes[0], "mean", "mean_low", "mean_high"),
+            (axes[1], "sd", "sd_low", "sd_high"),
+        ):
+            got = [row["runouts"][name] for row in rows]
+            y = np.array([row[value] for row in got])
+            span = [y - [row[low] for row in got], [row[high] for row in got] - y]
+            tint = ACF_COLOURS.get(acf, OTHER)
+            axis.errorbar(x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper())
+        shares = [row["exceedance"] for row in rows]
+        y = np.array([row["value"] for row in shares])
+        span = [y - [row["low"] for row in shares], [row["high"] for row in shares] - y]
+        tint = ACF_COLOURS.get(acf, OTHER)
+        axes[2].errorbar(x, y, np.abs(span), color=tint, marker="o", ms=4, capsize=2, lw=1.3)
+    _mark_deterministic(axes[0], floor, vertical=False)
+    if np.isfinite(floor["sd"]):
+        axes[1].axhline(floor["sd"], color=INK, lw=1.1, ls=(0, (4, 2)), label="noise floor")
+    axes[0].set_ylabel(f"mean runout, {RUNOUTS[name]} [m]")
+    axes[1].set_ylabel("standard deviation [m]")
+    axes[1].set_ylim(bottom=0)
+    axes[2].set_ylabel("P(runout > homogeneous mean)")
+    axes[2].set_ylim(0, 1)
+    for axis in axes:
+        axis.set_xlabel("coefficient of variation")
+    axes[1].legend()
+    return figure
+
+
+@styled
+def profile_figure(cases, geometry):
+    """Depth of the final deposit: median with the band from 5 to 95 % of the members."""
+    shown = [case for case in cases if case.profile_height is not None and case.ok.any()]
+    if not shown:
+        return None
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=(11.5, 2.1 * rows + 0.4), sharex=True, sharey=True, squeeze=False
+    )
+    reach = 0.0
+    for axis, case in zip(axes.flat, shown):
+        heights = case.profile_height[case.ok]
+        heights = heights[np.isfinite(heights).all(axis=1)]
+        if len(heights) == 0:
+            continue
+        low, middle, high = np.percentile(heights, [5, 50, 95], axis=0)
+        x = case.profile_x
+        axis.fill_between(x, low, high, color=colour(case), alpha=0.30, lw=0, label="5 to 95 %")
+        axis.plot(x, middle, color=colour(case), lw=1.4, label="median")
+        reach = max(reach, x[high > 0].max() if (high > 0).any() else 0.0)
+        axis.set_title(case.label)
+        if geometry.toe is not None:
+            axis.axvline(geometry.toe, color=INK, lw=0.8, ls=":")
+    for axis in axes.flat[len(shown) :]:
+        axis.axis("off")
+    axes[0, 0].set_xlim(shown[0].profile_x[0], 1.05 * reach + 0.1)
+    axes[0, 0].set_ylim(bottom=0)
+    axes[0, 0].legend()
+    for axis in axes[-1]:
+        axis.set_xlabel("x [m]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("depth [m]")
+    return figure
+
+
+@styled
+def configuration_figure(snapshot, geometry):
+    """Initial field and final deposit, coloured by friction angle: red strong, blue weak, as in Figs. 8 and 9
+    of the paper."""
+    states = [state for state in (snapshot.initial, snapshot.final) if state is not None]
+    if not states:
+        return None
+    right = max(state.position[:, 0].max() for state in states)
+    top = max(state.position[:, 1].max() for state in states)
+    widths = [state.position[:, 0].max() for state in states]
+    figure, axes = plt.subplots(
+        1, len(states), figsize=(11.5, 0.6 + 9.6 * top / sum(widths)), squeeze=False,
+        gridspec_kw={"width_ratios": widths},
+    )
+    angles = np.concatenate([state.friction_angle for state in states])
+    middle = float(np.mean(angles))
+    spread = max(3.0 * float(np.std(angles)), 1e-3)
+    spacing = geometry.point_spacing or right / 150
+    for axis, state, width in zip(axes[0], states, widths):
+        points = 11.5 * 72 * 0.84 / sum(widths) * spacing
+        drawn = axis.scatter(
+            *state.position.T, c=state.friction_angle, s=max(points**2 * 0.9, 0.3), marker="s", lw=0,
+            cmap="RdBu_r", vmin=middle - spread, vmax=middle + spread,
+        )
+        axis.set_aspect("equal")
+        axis.set_xlim(-0.02 * width, 1.02 * width)
+        axis.set_ylim(-0.01 * top, 1.02 * top)
+        axis.grid(False)
+        axis.set_xlabel("x [m]")
+        axis.set_title(f"t = {state.time:.2f} s")
+    axes[0, 0].set_ylabel("y [m]")
+    figure.colorbar(drawn, ax=list(axes[0]), label="friction angle [°]", shrink=0.9, pad=0.01)
+    return figure

@@ -1,0 +1,75 @@
+"""Reads the first and last state of members from DIR/snapshots."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Optional
+
+import h5py
+import numpy as np
+
+_FILE = re.compile(r"^(?P<label>.+)_r(?P<id>\d+)\.h5$")
+_STEP = re.compile(r"^step_(\d+)$")
+
+
+@dataclass(frozen=True)
+class State:
+    """All points at one time: positions [np, 2] in m, friction angles [np] in degrees."""
+
+    step: int
+    time: float
+    position: np.ndarray
+    friction_angle: np.ndarray
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    label: str
+    id: int
+    #: None if step 0 is not in the file.
+    initial: Optional[State]
+    final: Optional[State]
+    #: Columns of /history by name; empty if there is none.
+    history: dict = field(default_factory=dict)
+
+
+def find_snapshots(directory: Path) -> list:
+    """(label, id, path) of every snapshot file, sorted; opens none."""
+    found = []
+    for path in sorted((Path(directory) / "snapshots").glob("*.h5")):
+        match = _FILE.match(path.name)
+        if match:
+            found.append((match["label"], int(match["id"]), path))
+    return sorted(found, key=lambda entry: entry[:2])
+
+
+def read_snapshot(label: str, member: int, path: Path) -> Optional[Snapshot]:
+    """None for a file that cannot be read: a member may be writing it at this moment."""
+    try:
+        with h5py.File(path, "r") as file:
+            steps = sorted((int(m[1]), name) for name in file for m in [_STEP.match(name)] if m)
+            if not steps:
+                return None
+            first, last = steps[0], steps[-1]
+            initial = _read_state(file, *first) if first[0] == 0 else None
+            final = _read_state(file, *last) if last[0] > 0 else None
+            history = {}
+            if "history" in file:
+                history = {name: dataset[...] for name, dataset in file["history"].items()}
+            return Snapshot(label, member, initial, final, history)
+    except (OSError, KeyError, ValueError, RuntimeError):
+        return None
+
+
+def _read_state(file: h5py.File, step: int, name: str) -> State:
+    group = file[name]
+    position = group["position"][...].astype(float)
+    if position.ndim != 2 or position.shape[1] != 2:
+        raise ValueError("position is not [np, 2]")
+    time = float(np.ravel(group["time"][...])[0]) if "time" in group else np.nan
+    angle = (group["friction_angle"][...].astype(float).reshape(-1)
+             if "friction_angle" in group else np.full(len(position), np.nan))
+    keep = np.isfinite(position).all(axis=1)
+    return State(step, time, position[keep], angle[keep])

@@ -1,0 +1,202 @@
+"""Estimates with their intervals. Plain arrays in, numbers out; what cannot be estimated is NaN."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Description:
+    """Of one sample. Interval of the mean by Student's t, of the standard deviation by chi-square
+    (exact for normal values, too narrow for heavy tails)."""
+
+    n: int
+    mean: float
+    mean_low: float
+    mean_high: float
+    sd: float
+    sd_low: float
+    sd_high: float
+    minimum: float
+    p05: float
+    median: float
+    p95: float
+    maximum: float
+
+    @property
+    def half_width(self) -> float:
+        return 0.5 * (self.mean_high - self.mean_low)
+
+
+@dataclass(frozen=True)
+class Proportion:
+    """Share of `n` with Wilson's score interval."""
+
+    count: int
+    n: int
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A difference of means with its t interval and the two-sided p value against zero."""
+
+    n: int
+    mean: float
+    low: float
+    high: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Running:
+    """Mean and standard deviation of the first k values, for each k in `count`, with bands."""
+
+    count: np.ndarray
+    mean: np.ndarray
+    mean_low: np.ndarray
+    mean_high: np.ndarray
+    sd: np.ndarray
+    sd_low: np.ndarray
+    sd_high: np.ndarray
+
+
+@dataclass(frozen=True)
+class Exceedance:
+    """P(S > x) at values x of the sample, with a pointwise Wilson band."""
+
+    x: np.ndarray
+    probability: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def finite(values) -> np.ndarray:
+    values = np.asarray(values, dtype=float).reshape(-1)
+    return values[np.isfinite(values)]
+
+
+def describe(values, confidence: float = CONFIDENCE) -> Description:
+    x = finite(values)
+    n = len(x)
+    if n == 0:
+        return Description(0, *[np.nan] * 11)
+    mean, sd = float(np.mean(x)), (float(np.std(x, ddof=1)) if n > 1 else np.nan)
+    half = _t_factor(n, confidence) * sd / np.sqrt(n)
+    low, high = _sd_factors(n, confidence)
+    p05, median, p95 = (float(q) for q in np.percentile(x, [5, 50, 95]))
+    return Description(n, mean, mean - half, mean + half, sd, sd * low, sd * high,
+                       float(x.min()), p05, median, p95, float(x.max()))
+
+
+def wilson(count: int, n: int, confidence: float = CONFIDENCE) -> Proportion:
+    if n == 0:
+        return Proportion(0, 0, np.nan, np.nan, np.nan)
+    interval = stats.binomtest(int(count), int(n)).proportion_ci(confidence, method="wilson")
+    return Proportion(int(count), int(n), count / n, float(interval.low), float(interval.high))
+
+
+def probability_above(values, threshold: float, confidence: float = CONFIDENCE) -> Proportion:
+    """Share of values greater than `threshold`; of none if the threshold is not known."""
+    x = finite(values)
+    if not np.isfinite(threshold):
+        return wilson(0, 0)
+    return wilson(int(np.count_nonzero(x > threshold)), len(x), confidence)
+
+
+def paired_difference(first, second, confidence: float = CONFIDENCE) -> Difference:
+    """Mean of `first - second` over pairs in which both are finite."""
+    d = finite(np.asarray(first, dtype=float) - np.asarray(second, dtype=float))
+    n = len(d)
+    if n < 2:
+        return Difference(n, float(d.mean()) if n else np.nan, np.nan, np.nan, np.nan)
+    mean, error = float(d.mean()), float(np.std(d, ddof=1)) / np.sqrt(n)
+    half = _t_factor(n, confidence) * error
+    if error == 0.0:
+        p_value = 1.0 if mean == 0.0 else 0.0
+    else:
+        p_value = float(2.0 * stats.t.sf(abs(mean) / error, n - 1))
+    return Difference(n, mean, mean - half, mean + half, p_value)
+
+
+def welch_difference(first, second, confidence: float = CONFIDENCE) -> Difference:
+    """Difference of the means of two independent samples of unequal variance."""
+    a, b = finite(first), finite(second)
+    if len(a) == 0 or len(b) == 0:
+        return Difference(0, np.nan, np.nan, np.nan, np.nan)
+    mean, n = float(a.mean() - b.mean()), len(a) + len(b)
+    if len(a) < 2 or len(b) < 2:
+        return Difference(n, mean, np.nan, np.nan, np.nan)
+    va, vb = np.var(a, ddof=1) / len(a), np.var(b, ddof=1) / len(b)
+    error = float(np.sqrt(va + vb))
+    if error == 0.0:
+        return Difference(n, mean, mean, mean, 1.0 if mean == 0.0 else 0.0)
+    freedom = (va + vb) ** 2 / (va**2 / (len(a) - 1) + vb**2 / (len(b) - 1))
+    half = float(stats.t.ppf(0.5 + 0.5 * confidence, freedom)) * error
+    return Difference(n, mean, mean - half, mean + half,
+                      float(2.0 * stats.t.sf(abs(mean) / error, freedom)))
+
+
+def holm(p_values) -> np.ndarray:
+    """p values adjusted for the number of comparisons (Holm 1979); NaN stays and is not counted."""
+    p = np.asarray(p_values, dtype=float)
+    adjusted = np.full(p.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(p))
+    ranked = known[np.argsort(p[known], kind="stable")]
+    factors = len(ranked) - np.arange(len(ranked))
+    adjusted[ranked] = np.minimum(1.0, np.maximum.accumulate(factors * p[ranked]))
+    return adjusted
+
+
+def running(values, confidence: float = CONFIDENCE, points: int = 240) -> Running:
+    """At most `points` counts, evenly spread; always the first two and the last."""
+    x = finite(values)
+    n = len(x)
+    count = np.unique(np.linspace(1, n, min(n, points)).round().astype(int)) if n else np.array([])
+    count = count[count >= 1].astype(int)
+    if len(count) == 0:
+        return Running(count, *[np.array([])] * 6)
+    shift = float(np.mean(x))  # against cancellation
+    total, squares = np.cumsum(x - shift)[count - 1], np.cumsum((x - shift) ** 2)[count - 1]
+    mean = total / count
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.maximum(squares - count * mean**2, 0.0) / (count - 1)
+        sd = np.where(count > 1, np.sqrt(variance), np.nan)
+        half = _t_factor(count, confidence) * sd / np.sqrt(count)
+        low, high = _sd_factors(count, confidence)
+    return Running(count, mean + shift, mean + shift - half, mean + shift + half,
+                   sd, sd * low, sd * high)
+
+
+def exceedance(values, confidence: float = CONFIDENCE, points: int = 160) -> Exceedance:
+    x = np.sort(finite(values))
+    n = len(x)
+    if n == 0:
+        return Exceedance(*[np.array([])] * 4)
+    # Even in rank, and every one of the upper tail, which the logarithmic axis spreads out.
+    index = np.unique(np.r_[np.linspace(0, n - 1, min(n, points)).round().astype(int),
+                            np.arange(max(0, n - 25), n)])
+    shares = [probability_above(x, x[k], confidence) for k in index]
+    return Exceedance(x[index], np.array([s.value for s in shares]),
+                      np.array([s.low for s in shares]), np.array([s.high for s in shares]))
+
+
+def _t_factor(n, confidence: float):
+    n = np.asarray(n, dtype=float)
+    factor = stats.t.ppf(0.5 + 0.5 * confidence, np.where(n > 1, n - 1, np.nan))
+    return float(factor) if factor.ndim == 0 else factor
+
+
+def _sd_factors(n, confidence: float):
+    """Factors on the standard deviation that give its interval."""
+    freedom = np.where(np.asarray(n) > 1, np.asarray(n, dtype=float) - 1, np.nan)
+    low = np.sqrt(freedom / stats.chi2.ppf(0.5 + 0.5 * confidence, freedom))
+    high = np.sqrt(freedom / stats.chi2.ppf(0.5 - 0.5 * confidence, freedom))
+    return (float(low), float(high)) if np.ndim(n) == 0 else (low, high)
