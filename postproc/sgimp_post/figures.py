@@ -277,13 +277,20 @@ def configuration_figure(snapshot, geometry):
     )
     angles = np.concatenate([state.friction_angle for state in states])
     middle = float(np.mean(angles))
-    spread = max(3.0 * float(np.std(angles)), 1e-3)
+    # Homogeneous ground (to within the jitter of its strength) has one colour and no bar.
+    is_uniform = float(np.ptp(angles)) < 1e-2
+    spread = 3.0 * float(np.std(angles)) if not is_uniform else 1.0
     spacing = geometry.point_spacing or right / 150
     for axis, state, width in zip(axes[0], states, widths):
         points = 11.5 * 72 * 0.84 / sum(widths) * spacing
+        tint = {"color": OTHER} if is_uniform else {
+            "c": state.friction_angle,
+            "cmap": "RdYlBu_r",
+            "vmin": middle - spread,
+            "vmax": middle + spread,
+        }
         drawn = axis.scatter(
-            *state.position.T, c=state.friction_angle, s=max(points**2 * 0.9, 0.3), marker="s", lw=0,
-            cmap="RdBu_r", vmin=middle - spread, vmax=middle + spread,
+            *state.position.T, s=max(points**2 * 0.9, 0.3), marker="s", lw=0, **tint
         )
         axis.set_aspect("equal")
         axis.set_xlim(-0.02 * width, 1.02 * width)
@@ -292,5 +299,7 @@ def configuration_figure(snapshot, geometry):
         axis.set_xlabel("x [m]")
         axis.set_title(f"t = {state.time:.2f} s")
     axes[0, 0].set_ylabel("y [m]")
+    if is_uniform:
+        return figure
     figure.colorbar(drawn, ax=list(axes[0]), label="friction angle [°]", shrink=0.9, pad=0.01)
     return figure
