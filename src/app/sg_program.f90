@@ -89,6 +89,7 @@ contains
     request%profile_x = model%scene%profile_x
     request%case_text = text
     request%resolved = resolved_text(config)
+    request%field_method = model%field_method()
     request%toe = model%scene%toe
     request%initial_width = model%scene%extent(2) - model%scene%extent(1)
     request%initial_height = model%scene%extent(4) - model%scene%extent(3)

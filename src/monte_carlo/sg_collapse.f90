@@ -15,6 +15,7 @@ module sg_collapse
   use sg_recorder, only: recorder_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulation, only: simulate, variation_t
+  use sg_text, only: to_text
   implicit none
   private
 
@@ -41,6 +42,7 @@ module sg_collapse
   contains
     procedure :: init => init_collapse
     procedure :: run => run_collapse
+    procedure :: field_method
     procedure, private :: vary_homogeneous
     procedure, private :: vary_by_field
     procedure, private :: is_recorded
@@ -71,6 +73,22 @@ contains
       if (allocated(error)) return
     end do
   end subroutine init_collapse
+
+  !> How the fields are sampled, with the jitter of each factor that needed one; empty without a field.
+  function field_method(this) result(text)
+    class(collapse_model_t), intent(in) :: this
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ''
+    if (.not. allocated(this%fields)) return
+    text = this%fields(1)%sampler%description
+    do k = 1, size(this%fields)
+      if (.not. this%fields(k)%sampler%jitter > 0.0_wp) cycle
+      text = text//'; '//trim(this%config%study%acf(k))//' is near-singular, jitter '// &
+        to_text(this%fields(k)%sampler%jitter, 2)//' on the diagonal'
+    end do
+  end function field_method
 
   !> One member; see member_model_t.
   subroutine run_collapse(this, case_index, id, monitor, outcome)

@@ -43,6 +43,8 @@ module sg_driver
     real(wp), allocatable :: profile_x(:)
     !> The case file verbatim, and every key resolved.
     character(len=:), allocatable :: case_text, resolved
+    !> How the fields are sampled, and the jitter that their factors needed: one line, may be empty.
+    character(len=:), allocatable :: field_method
     !> Initial toe, from which runouts are measured, and extent of the body, and the spacing of
     !> points, in m.
     real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
@@ -145,6 +147,8 @@ contains
     associate (record => director%record, config => request%config)
       record%case_text = request%case_text
       record%resolved = request%resolved
+      record%field_method = ''
+      if (allocated(request%field_method)) record%field_method = request%field_method
       record%host = host_name()
       record%started = utc_time()
       record%ended = ''
@@ -231,6 +235,9 @@ contains
     call director%progress%say(trim(request%config%name)//': '//to_text(director%plan%total())// &
       ' members of '//to_text(size(director%results))//' cases on '// &
       to_text(director%record%ranks)//' ranks, into '//director%directory)
+    if (director%record%field_method /= '') then
+      call director%progress%say('random field: '//director%record%field_method)
+    end if
     if (resumed > 0) call director%progress%say('resumed: '//to_text(done)// &
       ' members are there, '//to_text(director%plan%total() - done)//' are missing')
     do i = 1, size(damage)

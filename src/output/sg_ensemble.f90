@@ -36,6 +36,8 @@ module sg_ensemble
   !> What the root of the file says of the run.
   type :: run_record_t
     character(len=:), allocatable :: case_text, resolved, host, started, ended, state, config_hash
+    !> How the fields were sampled; empty for a deterministic run.
+    character(len=:), allocatable :: field_method
     integer(i8) :: seed = 0
     integer :: ranks = 1, realizations = 0
     real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
@@ -113,6 +115,7 @@ contains
     call file%set('/', 'compiler', COMPILER)
     call file%set('/', 'compiler_flags', COMPILER_FLAGS)
     call file%set('/', 'libraries', LIBRARIES)
+    if (record%field_method /= '') call file%set('/', 'field_method', record%field_method)
     call file%set('/', 'host', record%host)
     call file%set('/', 'ranks', int(record%ranks, i4))
     call file%set('/', 'started', record%started)
