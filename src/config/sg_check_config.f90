@@ -237,6 +237,7 @@ contains
 
     if (.not. desk%good('grid', 1, 'x_min x_max y_min y_max cell_size')) return
     associate (grid => desk%config%grid)
+      if (grid%x_max <= grid%x_min .or. grid%y_max <= grid%y_min) return
       slack = EDGE_TOLERANCE*grid%cell_size
       if (low(1) < grid%x_min - slack .or. high(1) > grid%x_max + slack) then
         call desk%fault('body', i, key, 'the body reaches from x = '//to_text(low(1), 6)//' to '// &
@@ -336,8 +337,9 @@ contains
       if (m == 0) return
       is_used = .false.
       do i = 1, size(desk%config%bodies)
+        ! A body whose material is faulty may be meant to be of this one.
         is_used = is_used .or. desk%config%bodies(i)%material == field%material .or. &
-          .not. desk%good('body', i, 'material')
+          desk%config%bodies(i)%material_index == 0 .or. .not. desk%good('body', i, 'material')
       end do
       if (.not. is_used) call desk%fault('random_field', 1, 'material', 'no &body is of material '// &
         quoted(field%material))

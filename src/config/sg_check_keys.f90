@@ -27,15 +27,38 @@ contains
     integer :: g, row
 
     do row = 1, size(GROUPS)
-      if (GROUPS(row)%required .and. nml%count(GROUPS(row)%name) == 0) then
-        call faults%add(nml%lines, '&'//GROUPS(row)%name, 'this group is missing ('// &
-          'sgimp --defaults shows an example)')
-      end if
+      call check_group_presence(nml, row, faults)
     end do
     do g = 1, nml%number
       if (group_is_known(nml, g, faults)) call check_group(nml, g, faults)
     end do
   end subroutine check_keys
+
+  !> A group that is required, by itself or by another group, and missing. One that a misspelt group
+  !> was meant to be is not reported a second time.
+  subroutine check_group_presence(nml, row, faults)
+    type(namelist_t), intent(in) :: nml
+    integer, intent(in) :: row
+    type(fault_list_t), intent(inout) :: faults
+    character(len=:), allocatable :: name, cause
+    integer :: g, k
+
+    name = trim(GROUPS(row)%name)
+    if (nml%count(name) > 0) return
+    cause = ''
+    do k = 1, size(KEYS)
+      if (KEYS(k)%group /= name .or. .not. KEYS(k)%required .or. KEYS(k)%needs == '') cycle
+      if (nml%count(KEYS(k)%needs) > 0) cause = ', and &'//trim(KEYS(k)%needs)//' needs its key '// &
+        trim(KEYS(k)%name)
+    end do
+    if (.not. GROUPS(row)%required .and. len(cause) == 0) return
+    do g = 1, nml%number
+      if (group_row(nml%groups(g)%name) > 0) cycle
+      if (did_you_mean(nml%groups(g)%name, GROUPS%name, '&') == 'did you mean &'//name//'?') return
+    end do
+    call faults%add(nml%lines, '&'//name, 'this group is missing'//cause//' ('// &
+      'sgimp --defaults shows an example)')
+  end subroutine check_group_presence
 
   logical function group_is_known(nml, g, faults) result(known)
     type(namelist_t), intent(in) :: nml
@@ -115,7 +138,7 @@ contains
     integer :: row
 
     key = group%entries(e)%key
-    hint = did_you_mean(key, pack(KEYS%name, KEYS%group == group%name), '')
+    hint = key_meant(group%name, key)
     if (len(hint) == 0) then
       do row = size(KEYS), 1, -1
         if (KEYS(row)%name == key) hint = 'did you mean '//trim(key)//' of &'// &
@@ -127,14 +150,23 @@ contains
       'there is no such key in this group ('//hint//')')
   end subroutine report_unknown
 
-  !> A key that is required and missing, or given and without meaning here.
+  !> `did you mean X?` for the name of a key that the group has not got, or empty.
+  function key_meant(group_name, key) result(hint)
+    character(len=*), intent(in) :: group_name, key
+    character(len=:), allocatable :: hint
+
+    hint = did_you_mean(key, pack(KEYS%name, KEYS%group == group_name), '')
+  end function key_meant
+
+  !> A key that is required and missing, or given and without meaning here. One that a misspelt key
+  !> was meant to be is not reported a second time.
   subroutine check_presence(nml, g, key, faults)
     type(namelist_t), intent(inout) :: nml
     integer, intent(in) :: g
     type(key_t), intent(in) :: key
     type(fault_list_t), intent(inout) :: faults
     character(len=:), allocatable :: reason
-    integer :: e, supplier
+    integer :: e, i, supplier
 
     e = nml%groups(g)%find(key%name)
     reason = why_not(nml, nml%groups(g), key)
@@ -143,7 +175,12 @@ contains
         nml%groups(g)%entries(e)%usable = .false.
         call faults%add(nml%groups(g)%entries(e)%line, where_is(key), 'does not apply here: '//reason)
       end if
-    else if (key%required .and. len(reason) == 0) then
+    else if (key%required .and. len(reason) == 0 .and. decider_is_good(nml%groups(g), key)) then
+      do i = 1, nml%groups(g)%number
+        if (key_row(nml%groups(g)%name, nml%groups(g)%entries(i)%key) > 0) cycle
+        if (key_meant(nml%groups(g)%name, nml%groups(g)%entries(i)%key) == &
+          'did you mean '//trim(key%name)//'?') return
+      end do
       supplier = 0
       if (len_trim(key%supplied_by) > 0) supplier = nml%locate(key%supplied_by, 1)
       if (supplier > 0) then
@@ -152,6 +189,22 @@ contains
       call faults%add(nml%groups(g)%line, where_is(key), 'this key is missing'//about(key))
     end if
   end subroutine check_presence
+
+  !> Whether the key that decides if this one applies has an accepted value (or there is no such key).
+  pure logical function decider_is_good(group, key) result(good)
+    type(nml_group_t), intent(in) :: group
+    type(key_t), intent(in) :: key
+    integer :: e
+
+    good = .true.
+    if (len_trim(key%when) == 0) return
+    e = group%find(key%when)
+    if (e > 0) then
+      good = group%entries(e)%usable
+    else
+      good = len_trim(KEYS(key_row(key%group, key%when))%default) > 0
+    end if
+  end function decider_is_good
 
   !> What a missing key would be, in brackets.
   function about(key) result(text)
@@ -178,7 +231,7 @@ contains
     character(len=:), allocatable :: reason
     character(len=:), allocatable :: word
     type(key_t) :: decider
-    integer :: e, i
+    integer :: e
 
     reason = ''
     if (len_trim(key%needs) > 0 .and. nml%count(key%needs) == 0) then
@@ -198,23 +251,25 @@ contains
         return
       end if
       if (has_word(key%when_is, word)) return
-      reason = 'only with '//trim(key%when)//' = '//quoted(word_at(key%when_is, 1))
-      do i = 2, count_words(key%when_is)
-        reason = reason//' or '//quoted(word_at(key%when_is, i))
-      end do
-      if (.not. any_available(key%when_is, decider%choices)) reason = reason//', which'//NOT_YET
+      reason = alternatives(key%when_is, decider%choices)
+      if (len(reason) == 0) reason = alternatives(key%when_is, decider%later)//', which'//NOT_YET
+      reason = 'only with '//trim(key%when)//' = '//reason
     end if
   end function why_not
 
-  pure logical function any_available(words, choices)
+  !> Those of `words` that are among `choices`, as `'a' or 'b'`.
+  pure function alternatives(words, choices) result(text)
     character(len=*), intent(in) :: words, choices
+    character(len=:), allocatable :: text
     integer :: i
 
-    any_available = .false.
+    text = ''
     do i = 1, count_words(words)
-      any_available = any_available .or. has_word(choices, word_at(words, i))
+      if (.not. has_word(choices, word_at(words, i))) cycle
+      if (len(text) > 0) text = text//' or '
+      text = text//quoted(word_at(words, i))
     end do
-  end function any_available
+  end function alternatives
 
   !> Number and types of the values of a key.
   subroutine check_entry(key, entry, faults)
@@ -228,8 +283,8 @@ contains
     entry%usable = .true.
     if (key%size /= ANY_NUMBER .and. entry%number /= key%size) then
       entry%usable = .false.
-      call faults%add(entry%line, where_is(key), 'takes '//values_in_words(key%size)//', but '// &
-        to_text(entry%number)//' are given'//hint_at_text(entry))
+      call faults%add(entry%line, where_is(key), 'takes '//values_in_words(key%size)//', not '// &
+        to_text(entry%number)//hint_at_text(entry))
     end if
     if (.not. entry%usable) return
     do i = 1, entry%number

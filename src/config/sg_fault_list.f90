@@ -41,11 +41,23 @@ contains
     this%number = this%number + 1
     this%items(this%number)%line = line
     if (len_trim(where) > 0) then
-      this%items(this%number)%text = trim(where)//': '//what
+      this%items(this%number)%text = printable(trim(where)//': '//what)
     else
-      this%items(this%number)%text = what
+      this%items(this%number)%text = printable(what)
     end if
   end subroutine add
+
+  !> Control characters, with which a file could do things to the terminal, become '?'.
+  pure function printable(text) result(clean)
+    character(len=*), intent(in) :: text
+    character(len=len(text)) :: clean
+    integer :: i
+
+    clean = text
+    do i = 1, len(text)
+      if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) clean(i:i) = '?'
+    end do
+  end function printable
 
   !> All faults, one a line as `file:line: text`, in the order of the file.
   function text_of_faults(this, file_name) result(text)

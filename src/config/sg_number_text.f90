@@ -48,8 +48,9 @@ contains
     end if
     ! Checked by hand, because reading an overflow raises a floating point exception.
     power = max(-100000_i8, min(power, 100000_i8)) + leading_power(mantissa)
-    if (len(fault) > 0 .or. power > 307) then
-      fault = 'is too large or too small for a real number'
+    if (len(fault) > 0) power = merge(-400_i8, 400_i8, low(mark + 1:mark + 1) == '-')
+    if (power > 307) then
+      fault = 'is too large for a real number'
     else if (power < -307) then
       fault = 'is too small for a real number'
     else

@@ -53,6 +53,11 @@ contains
     type(reader_t) :: reader
     type(fault_list_t) :: faults
 
+    if (index(text, achar(0)) > 0) then
+      call raise(error, EXIT_BAD_INPUT, file_name//':1: this is no text file, it holds zero bytes '// &
+        '(a case file is plain ASCII or UTF-8)', file_name)
+      return
+    end if
     call scan_namelist(text, reader%nml, faults)
     call check_keys(reader%nml, faults)
 
