@@ -159,6 +159,7 @@ contains
     seconds = 0.0_wp
     first = 1
     status = verify(text, '0123456789:')
+    if (count_colons(text) > 2 .or. index(text//'/', ':/') > 0) status = 1
     do while (first <= len(text) .and. status == 0)
       mark = index(text(first:)//':', ':')
       read (text(first:first + mark - 2), *, iostat=status) number
@@ -169,6 +170,13 @@ contains
       call fail('--walltime needs HH:MM:SS above zero, not '//text, error)
     end if
   end subroutine read_duration
+
+  pure integer function count_colons(text) result(number)
+    character(len=*), intent(in) :: text
+    integer :: i
+
+    number = count([(text(i:i) == ':', i=1, len(text))])
+  end function count_colons
 
   subroutine fail(message, error)
     character(len=*), intent(in) :: message
