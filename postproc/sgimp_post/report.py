@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import json
 import math
@@ -27,8 +28,9 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
     ensemble = read_ensemble(directory)
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
+    drawn = _figures(ensemble, summary)
     html = _environment().get_template("report.html.j2").render(
-        **_figures(ensemble, summary),
+        **drawn,
         s=summary,
         a=ensemble.attributes,
         directory=Path(directory),
@@ -44,6 +46,9 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
         (output.parent / "report.json").write_text(
             json.dumps(_finite({**summary, "provenance": ensemble.attributes}), indent=1)
         )
+        for shown in drawn["configurations"]:
+            name = f"{shown['label']}_r{shown['id']:06d}.png"
+            (output.parent / name).write_bytes(base64.b64decode(shown["image"].split(",")[1]))
         output.write_text(html, encoding="utf-8")
     except OSError as cause:
         raise PostError(f"{output.parent}: cannot be written ({cause.strerror})") from cause

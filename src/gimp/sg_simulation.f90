@@ -40,6 +40,11 @@ module sg_simulation
   integer, parameter :: POINTS_PER_QUESTION = 100000
   !> A step below this share of the first one counts as collapsed.
   real(wp), parameter :: COLLAPSED_STEP = 1.0e-4_wp
+  !> A point counts as lost once its centre is this share of a cell outside. At a closed wall it
+  !> can come no
+  !> farther than half its own width: there all nodes it reaches are held. A point without stress
+  !> may sink in so far.
+  real(wp), parameter :: OUTSIDE_MARGIN = 0.51_wp
   !> A speed this many times above all that the scene can explain (wave speed, fall through the
   !> domain, initial
   !> speed) counts as runaway.
@@ -173,13 +178,16 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: x_last, y_last
+    real(wp) :: margin, x_first, x_last, y_first, y_last
     integer :: p
 
-    x_last = config%grid%x_min + (config%grid%x_max - config%grid%x_min)*(1.0_wp &
-      + variation%cell_stretch)
-    y_last = config%grid%y_min + (config%grid%y_max - config%grid%y_min)*(1.0_wp &
-      + variation%cell_stretch)
+    margin = OUTSIDE_MARGIN*solver%grid%cell_size
+    x_first = config%grid%x_min - margin
+    x_last = config%grid%x_min + margin + &
+      (config%grid%x_max - config%grid%x_min)*(1.0_wp + variation%cell_stretch)
+    y_first = config%grid%y_min - margin
+    y_last = config%grid%y_min + margin + &
+      (config%grid%y_max - config%grid%y_min)*(1.0_wp + variation%cell_stretch)
     associate (t => solver%tally, s => solver%particles)
       if (.not. abs(t%kinetic_energy) <= huge(1.0_wp) &
         .or. .not. abs(t%internal_work) <= huge(1.0_wp)) then
@@ -188,11 +196,10 @@ contains
         call fail(STATUS_NOT_FINITE, p, &
           'velocity or stress is not a finite number: the time step is too long or '// &
                   'the material too soft for its load')
-      else if (t%x_min < config%grid%x_min .or. t%x_max > x_last .or. t%y_min < config%grid%y_min &
+      else if (t%x_min < x_first .or. t%x_max > x_last .or. t%y_min < y_first &
                .or. t%y_max > y_last) then
-        p = minloc(merge(0, 1, s%x < config%grid%x_min .or. s%x > x_last &
-          .or. s%y < config%grid%y_min &
-                         .or. s%y > y_last), dim=1)
+        p = minloc(merge(0, 1, s%x < x_first .or. s%x > x_last .or. s%y < y_first .or. &
+                         s%y > y_last), dim=1)
         call fail(STATUS_POINT_LOST, p, &
           'point left the grid: make the grid larger or close the wall')
       else if (t%speed_squared > clock%speed_limit**2) then
