@@ -272,7 +272,7 @@ def configuration_figure(snapshot, geometry):
     top = max(state.position[:, 1].max() for state in states)
     widths = [state.position[:, 0].max() for state in states]
     figure, axes = plt.subplots(
-        1, len(states), figsize=(11.5, 0.6 + 9.6 * top / sum(widths)), squeeze=False,
+        1, len(states), figsize=(11.5, 1.15 + 9.6 * top / sum(widths)), squeeze=False,
         gridspec_kw={"width_ratios": widths},
     )
     angles = np.concatenate([state.friction_angle for state in states])
