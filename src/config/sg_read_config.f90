@@ -67,18 +67,17 @@ contains
     allocate (config%materials(reader%nml%count('material')))
     allocate (config%bodies(reader%nml%count('body')))
     call visit_config(config, reader)
-    call complete(config, reader%nml)
+    call complete(config)
 
     call check_config(config, reader%nml, faults)
     if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
   end subroutine read_config
 
   !> Values that follow from others.
-  subroutine complete(config, nml)
+  subroutine complete(config)
     type(config_t), intent(inout) :: config
-    type(namelist_t), intent(in) :: nml
     character(len=*), parameter :: NAME_MARK = '<name>'
-    integer :: i, mark, study
+    integer :: i, mark
 
     do i = 1, size(config%bodies)
       config%bodies(i)%material_index = index_of_material(config, config%bodies(i)%material)
@@ -91,8 +90,11 @@ contains
       return
     end if
     config%random_field%material_index = index_of_material(config, config%random_field%material)
-    if (.not. config%has_study) return
-    study = nml%locate('study', 1)
+    if (.not. config%has_study) then
+      config%study%acf = [config%random_field%acf]
+      config%study%cov = [config%random_field%cov]
+      return
+    end if
     if (size(config%study%acf) == 0) then
       config%study%acf = [config%random_field%acf]
     else if (len_trim(config%random_field%acf) == 0) then
