@@ -1,5 +1,5 @@
-!> What several keys of a case must satisfy together. A check is made only where all keys it looks at
-!> have passed on their own, so that one mistake gives one fault.
+!> What several keys of a case must satisfy together. A check is made only where all keys it looks
+!> at have passed on their own, so that one mistake gives one fault.
 module sg_check_config
   use sg_config, only: body_config_t, config_t
   use sg_fault_list, only: did_you_mean, fault_list_t, quoted
@@ -33,8 +33,8 @@ module sg_check_config
 
 contains
 
-  !> Adds what is wrong to `faults`. `config` was filled from `nml`, with neutral values for keys that
-  !> are missing or faulty.
+  !> Adds what is wrong to `faults`. `config` was filled from `nml`, with neutral values for keys
+  !> that are missing or faulty.
   subroutine check_config(config, nml, faults)
     type(config_t), intent(in) :: config
     type(namelist_t), intent(in) :: nml
@@ -102,7 +102,8 @@ contains
     associate (grid => desk%config%grid)
       if ((grid%x_max - grid%x_min)/grid%cell_size*((grid%y_max - grid%y_min)/grid%cell_size) > &
         MOST_CELLS) then
-        call desk%fault('grid', 1, 'cell_size', to_text(grid%cell_size)//' m makes more cells than '// &
+        call desk%fault('grid', 1, 'cell_size', to_text(grid%cell_size)// &
+          ' m makes more cells than '// &
           'any machine can hold (allowed: up to '//to_text(MOST_CELLS)//' cells)')
       end if
     end associate
@@ -119,13 +120,15 @@ contains
     if (.not. desk%good('grid', 1, low_key//' '//high_key)) return
     if (high <= low) then
       fits = .false.
-      call desk%fault('grid', 1, high_key, to_text(high)//' is not above '//low_key//' = '//to_text(low))
+      call desk%fault('grid', 1, high_key, to_text(high)//' is not above '//low_key//' = '// &
+        to_text(low))
       return
     end if
     if (.not. desk%good('grid', 1, 'cell_size')) return
     cells = (high - low)/desk%config%grid%cell_size
     if (abs(cells - anint(cells)) > WHOLE_TOLERANCE*cells .or. cells < 0.5_wp) then
-      call desk%fault('grid', 1, high_key, high_key//' - '//low_key//' = '//to_text(high - low, 9)// &
+      call desk%fault('grid', 1, high_key, high_key//' - '//low_key//' = '//to_text(high - low, &
+        9)// &
         ' m is '//to_text(cells, 6)//' cells of '//to_text(desk%config%grid%cell_size)// &
         ' m (allowed: a whole number of cells, for instance '//high_key//' = '// &
         to_text(low + max(anint(cells), 1.0_wp)*desk%config%grid%cell_size, 12)//')')
@@ -141,7 +144,8 @@ contains
       if (desk%good('material', i, 'name')) then
         do j = 1, i - 1
           if (desk%config%materials(j)%name /= material%name) cycle
-          call desk%fault('material', i, 'name', quoted(material%name)//' is taken by the material in '// &
+          call desk%fault('material', i, 'name', quoted(material%name)// &
+            ' is taken by the material in '// &
             'line '//to_text(desk%nml%line_of('material', j, 'name')))
           exit
         end do
@@ -188,8 +192,9 @@ contains
           exit
         end do
       end if
-      if (desk%good('body', i, 'material')) &
+      if (desk%good('body', i, 'material')) then
         call check_material_name(desk, 'body', i, body%material, body%material_index)
+      end if
       if (.not. desk%good('body', i, 'shape')) return
       select case (body%shape)
       case ('rectangle')
@@ -200,6 +205,7 @@ contains
           [body%x, body%y] - body%radius, [body%x, body%y] + body%radius)
       case ('polygon')
         if (desk%good('body', i, 'vertices')) call check_polygon(desk, i)
+      case default ! has been refused before
       end select
     end associate
   end subroutine check_body
@@ -222,8 +228,9 @@ contains
     do j = 2, size(desk%config%materials)
       hint = hint//', '//trim(desk%config%materials(j)%name)
     end do
-    if (len(did_you_mean(name, desk%config%materials%name, '')) > 0) &
+    if (len(did_you_mean(name, desk%config%materials%name, '')) > 0) then
       hint = hint//'; '//did_you_mean(name, desk%config%materials%name, '')
+    end if
     call desk%fault(group, i, 'material', 'there is no material '//quoted(name)//' ('//hint//')')
   end subroutine check_material_name
 
@@ -282,7 +289,8 @@ contains
     end associate
     call corners_are_distinct(corners, first, second)
     if (first > 0) then
-      call desk%fault('body', i, 'vertices', 'corners '//to_text(first)//' and '//to_text(second)// &
+      call desk%fault('body', i, 'vertices', 'corners '//to_text(first)//' and '// &
+        to_text(second)// &
         ' are the same point (the polygon closes by itself: do not repeat the first corner)')
       return
     end if
@@ -306,7 +314,8 @@ contains
     associate (loading => desk%config%loading)
       if (loading%initial_stress == 'geostatic' .and. &
         (loading%gravity(1) /= 0.0_wp .or. .not. loading%gravity(2) < 0.0_wp)) then
-        call desk%fault('loading', 1, 'initial_stress', '''geostatic'' needs gravity straight down, '// &
+        call desk%fault('loading', 1, 'initial_stress', &
+          '''geostatic'' needs gravity straight down, '// &
           'not gravity = '//to_text(loading%gravity(1))//', '//to_text(loading%gravity(2))// &
           ' (allowed: gravity = 0, negative; or ''none'')')
       end if
@@ -341,12 +350,14 @@ contains
         is_used = is_used .or. desk%config%bodies(i)%material == field%material .or. &
           desk%config%bodies(i)%material_index == 0 .or. .not. desk%good('body', i, 'material')
       end do
-      if (.not. is_used) call desk%fault('random_field', 1, 'material', 'no &body is of material '// &
+      if (.not. is_used) call desk%fault('random_field', 1, 'material', &
+        'no &body is of material '// &
         quoted(field%material))
       if (.not. desk%good('material', m, 'model')) return
       if (desk%config%materials(m)%model /= 'mohr_coulomb') then
         call desk%fault('random_field', 1, 'material', quoted(field%material)//' is '// &
-          trim(desk%config%materials(m)%model)//' and has no friction angle to vary (allowed: a '// &
+          trim(desk%config%materials(m)%model)// &
+          ' and has no friction angle to vary (allowed: a '// &
           'material with model = ''mohr_coulomb'')')
         return
       end if
@@ -381,14 +392,17 @@ contains
     integer, intent(in) :: m
 
     associate (field => desk%config%random_field, material => desk%config%materials(m))
-      if (desk%good('random_field', 1, 'mean') .and. desk%good('material', m, 'friction_angle')) then
+      if (desk%good('random_field', 1, 'mean') .and. desk%good('material', m, &
+        'friction_angle')) then
         if (field%mean /= material%friction_angle) call desk%fault('random_field', 1, 'mean', &
-          to_text(field%mean)//' differs from friction_angle = '//to_text(material%friction_angle)// &
+          to_text(field%mean)//' differs from friction_angle = '// &
+          to_text(material%friction_angle)// &
           ' of material '//quoted(material%name)//' (line '// &
           to_text(desk%nml%line_of('material', m, 'friction_angle'))//'), with which the '// &
           'homogeneous case runs (allowed: the same value in both)')
       end if
-      if (desk%good('random_field', 1, 'lower') .and. desk%good('material', m, 'dilation_angle')) then
+      if (desk%good('random_field', 1, 'lower') .and. desk%good('material', m, &
+        'dilation_angle')) then
         if (material%dilation_angle > field%lower) call desk%fault('random_field', 1, 'lower', &
           'friction angles down to '//to_text(field%lower)//' fall below dilation_angle = '// &
           to_text(material%dilation_angle)//' of material '//quoted(material%name)// &
@@ -403,7 +417,8 @@ contains
 
     g = desk%nml%locate('study', 1)
     if (desk%nml%groups(g)%number == 0) then
-      call desk%faults%add(desk%nml%groups(g)%line, '&study', 'this group lists nothing (give acf, '// &
+      call desk%faults%add(desk%nml%groups(g)%line, '&study', &
+        'this group lists nothing (give acf, '// &
         'cov or both, or leave the group out)')
     end if
     associate (study => desk%config%study)

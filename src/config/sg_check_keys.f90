@@ -48,7 +48,8 @@ contains
     cause = ''
     do k = 1, size(KEYS)
       if (KEYS(k)%group /= name .or. .not. KEYS(k)%required .or. KEYS(k)%needs == '') cycle
-      if (nml%count(KEYS(k)%needs) > 0) cause = ', and &'//trim(KEYS(k)%needs)//' needs its key '// &
+      if (nml%count(KEYS(k)%needs) > 0) cause = ', and &'//trim(KEYS(k)%needs)// &
+        ' needs its key '// &
         trim(KEYS(k)%name)
     end do
     if (.not. GROUPS(row)%required .and. len(cause) == 0) return
@@ -173,7 +174,8 @@ contains
     if (e > 0) then
       if (len(reason) > 0 .and. .not. nml%groups(g)%entries(e)%spoilt) then
         nml%groups(g)%entries(e)%usable = .false.
-        call faults%add(nml%groups(g)%entries(e)%line, where_is(key), 'does not apply here: '//reason)
+        call faults%add(nml%groups(g)%entries(e)%line, where_is(key), 'does not apply here: '// &
+          reason)
       end if
     else if (key%required .and. len(reason) == 0 .and. decider_is_good(nml%groups(g), key)) then
       do i = 1, nml%groups(g)%number
@@ -190,7 +192,8 @@ contains
     end if
   end subroutine check_presence
 
-  !> Whether the key that decides if this one applies has an accepted value (or there is no such key).
+  !> Whether the key that decides if this one applies has an accepted value (or there is no such
+  !> key).
   pure logical function decider_is_good(group, key) result(good)
     type(nml_group_t), intent(in) :: group
     type(key_t), intent(in) :: key
@@ -313,8 +316,10 @@ contains
 
     hint = ''
     if (entry%number > 1) then
-      if (.not. entry%values(1)%quoted .and. verify(entry%values(1)%text, '+-.0123456789eEdD') > 0) &
+      if (.not. entry%values(1)%quoted .and. verify(entry%values(1)%text, &
+        '+-.0123456789eEdD') > 0) then
         hint = ' (text must be in quotes)'
+      end if
     end if
   end function hint_at_text
 
@@ -330,8 +335,9 @@ contains
     case default
       if (.not. in_quotes) then
         fault = 'text must be in quotes: '//quoted(text)
-        if (key%kind == KIND_WORD .and. .not. has_word(key%choices, lower_case(text))) &
+        if (key%kind == KIND_WORD .and. .not. has_word(key%choices, lower_case(text))) then
           fault = fault//' (allowed: '//listed(key%choices)//')'
+        end if
       else if (key%kind == KIND_WORD) then
         fault = fault_of_word(key, lower_case(text))
       else if (key%kind == KIND_NAME) then
@@ -374,8 +380,9 @@ contains
     text = 'a number'
     if (key%kind == KIND_INTEGER) text = 'a whole number'
     if (len(range_in_words(key%range)) > 0) text = text//', '//range_in_words(key%range)
-    if (len_trim(key%unit) > 0 .and. key%unit /= '1' .and. key%unit /= '*') &
+    if (len_trim(key%unit) > 0 .and. key%unit /= '1' .and. key%unit /= '*') then
       text = text//', in '//trim(key%unit)
+    end if
   end function allowed_numbers
 
   function fault_of_word(key, word) result(fault)

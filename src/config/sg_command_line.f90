@@ -190,18 +190,23 @@ contains
     character(len=*), parameter :: N = new_line('a')
 
     text = 'Runout of landslides and granular flows over random fields of soil strength.'//N//N// &
-      'Usage:  mpirun -n RANKS sgimp CASE.nml [options]     run, or go on where a run was stopped'//N// &
-      '        sgimp --keys [GROUP] [--json]                every key: type, unit, default, range, meaning'//N// &
+      'Usage:  mpirun -n RANKS sgimp CASE.nml [options]     run, or go on where a '// &
+      'run was stopped'//N// &
+      '        sgimp --keys [GROUP] [--json]                every key: type, unit, '// &
+      'default, range, meaning'//N// &
       '        sgimp --defaults                             a case file to start from'//N//N// &
       '  --check                 check the case and say what it would take; writes nothing'//N// &
-      '  --output DIR            directory of the results, instead of the one in the case file'//N// &
+      '  --output DIR            directory of the results, instead of the one in the case file'// &
+      N// &
       '  --overwrite             throw away what the directory holds'//N// &
-      '  --walltime HH:MM:SS     end cleanly within this time; the same command goes on later'//N// &
+      '  --walltime HH:MM:SS     end cleanly within this time; the same command goes on later'// &
+      N// &
       '  --realization I         compute one member again, by itself, and print its row'//N// &
       '    --study-case LABEL    of this case of a study, as snx_cov0.05 or deterministic'//N// &
       '    --snapshots           and write its states to DIR/snapshots'//N// &
       '  --version, --help'//N//N// &
-      'Exit codes: 0 complete; 1 internal error; 2 bad input; 3 stopped early, resumable; 4 complete, but more'//N// &
-      'failed members than allowed. To stop a run cleanly: touch DIR/STOP, or send SIGUSR1 or SIGTERM.'
+      'Exit codes: 0 complete; 1 internal error; 2 bad input; 3 stopped early, resumable;'//N// &
+      '4 complete, but more failed members than allowed.'//N// &
+      'To stop a run cleanly: touch DIR/STOP, or send SIGUSR1 or SIGTERM.'
   end function usage_text
 end module sg_command_line

@@ -1,5 +1,6 @@
-!> The typed configuration of a run: what a case file says, with every default filled in and every check passed.
-!> SI units, angles in degrees, as in the case file. Names and meanings are those of `sgimp --keys`.
+!> The typed configuration of a run: what a case file says, with every default filled in and every
+!> check passed. SI units, angles in degrees, as in the case file. Names and meanings are those of
+!> `sgimp --keys`.
 module sg_config
   use sg_kinds, only: i8, wp
   implicit none
@@ -76,7 +77,8 @@ module sg_config
   end type monte_carlo_config_t
 
   type :: study_config_t
-    !> Every combination is a case. Size 1 with the value of &random_field where &study does not list the key.
+    !> Every combination is a case. Size 1 with the value of &random_field where &study does not
+    !> list the key.
     character(len=NAME_LENGTH), allocatable :: acf(:)
     real(wp), allocatable :: cov(:)
   end type study_config_t
@@ -99,7 +101,8 @@ module sg_config
     type(body_config_t), allocatable :: bodies(:)
     type(loading_config_t) :: loading
     type(solver_config_t) :: solver
-    !> False: no &random_field group, the run is deterministic and `random_field` holds nothing of meaning.
+    !> False: no &random_field group, the run is deterministic and `random_field` holds nothing of
+    !> meaning.
     logical :: has_random_field
     type(random_field_config_t) :: random_field
     type(monte_carlo_config_t) :: monte_carlo

@@ -1,7 +1,7 @@
 !> Which component of `config_t` belongs to which key: said once, for reading and for writing.
 !> Within a group, a key that decides whether others apply comes before them.
 module sg_config_fields
-  use sg_config, only: config_t
+  use sg_config, only: config_t, NAME_LENGTH
   use sg_kinds, only: i8, wp
   implicit none
   private
@@ -84,19 +84,19 @@ module sg_config_fields
     end subroutine visit_integers_interface
 
     subroutine visit_word_interface(this, key, value)
-      import :: config_visitor_t
+      import :: config_visitor_t, NAME_LENGTH
       implicit none
       class(config_visitor_t), intent(inout) :: this
       character(len=*), intent(in) :: key
-      character(len=*), intent(inout) :: value
+      character(len=NAME_LENGTH), intent(inout) :: value
     end subroutine visit_word_interface
 
     subroutine visit_words_interface(this, key, value)
-      import :: config_visitor_t
+      import :: config_visitor_t, NAME_LENGTH
       implicit none
       class(config_visitor_t), intent(inout) :: this
       character(len=*), intent(in) :: key
-      character(len=*), allocatable, intent(inout) :: value(:)
+      character(len=NAME_LENGTH), allocatable, intent(inout) :: value(:)
     end subroutine visit_words_interface
 
     subroutine visit_text_interface(this, key, value)
@@ -111,7 +111,8 @@ module sg_config_fields
 contains
 
   !> Shows every key of `config` to the visitor. `materials` and `bodies` have their sizes and
-  !> `has_random_field`, `has_study` their values already. Groups that the run has not got are left out.
+  !> `has_random_field`, `has_study` their values already. Groups that the run has not got are left
+  !> out.
   subroutine visit_config(config, visitor)
     type(config_t), intent(inout) :: config
     class(config_visitor_t), intent(inout) :: visitor

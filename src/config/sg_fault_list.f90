@@ -107,7 +107,8 @@ contains
       if (len_trim(candidates(i)) == 0) cycle
       distance = edit_distance(trim(word), trim(candidates(i)))
       ! Part of a name counts as close, but any true misspelling comes first.
-      if (len_trim(word) >= 3 .and. index(candidates(i), trim(word)) == 1) distance = min(distance, 1)
+      if (len_trim(word) >= 3 .and. index(candidates(i), &
+        trim(word)) == 1) distance = min(distance, 1)
       if (distance < best) then
         best = distance
         closest = i

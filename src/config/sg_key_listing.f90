@@ -115,9 +115,12 @@ contains
     character(len=:), allocatable :: text
 
     text = '  {"group": '//json_text(key%group)//', "key": '//json_text(key%name)//', "type": '// &
-      json_text(type_text(key))//', "unit": '//json_text(key%unit)//', "default": '//json_text(key%default)// &
-      ', "range": '//json_text(key%range)//', "choices": '//json_text(key%choices)//', "later": '// &
-      json_text(key%later)//', "required": '//to_text(key%required)//', "meaning": '//json_text(key%meaning)//'}'
+      json_text(type_text(key))//', "unit": '//json_text(key%unit)//', "default": '// &
+      json_text(key%default)// &
+      ', "range": '//json_text(key%range)//', "choices": '//json_text(key%choices)// &
+      ', "later": '// &
+      json_text(key%later)//', "required": '//to_text(key%required)//', "meaning": '// &
+      json_text(key%meaning)//'}'
   end function json_row
 
   !> A JSON string; the schema holds no control characters.
@@ -146,7 +149,8 @@ contains
       do k = 1, size(KEYS)
         if (KEYS(k)%group /= GROUPS(g)%name) cycle
         if (.not. belongs_to_example(KEYS(k))) cycle
-        text = text//'  '//trim(KEYS(k)%name)//' = '//value_text(KEYS(k))//'  ! '//trim(KEYS(k)%meaning)
+        text = text//'  '//trim(KEYS(k)%name)//' = '//value_text(KEYS(k))//'  ! '// &
+          trim(KEYS(k)%meaning)
         if (KEYS(k)%unit /= '' .and. KEYS(k)%unit /= '1') text = text//' ('//trim(KEYS(k)%unit)//')'
         text = text//BREAK
       end do

@@ -1,6 +1,6 @@
 !> The text of a case file, taken apart: groups, keys and values with their line numbers, all still
-!> text. The scanner fills it, checks mark what can be used, `sg_read_config` takes values out of it;
-!> for `resolved.nml` it goes the other way.
+!> text. The scanner fills it, checks mark what can be used, `sg_read_config` takes values out of
+!> it; for `resolved.nml` it goes the other way.
 module sg_namelist
   implicit none
   private

@@ -54,7 +54,8 @@ contains
     type(fault_list_t) :: faults
 
     if (index(text, achar(0)) > 0) then
-      call raise(error, EXIT_BAD_INPUT, file_name//':1: this is no text file, it holds zero bytes '// &
+      call raise(error, EXIT_BAD_INPUT, file_name// &
+        ':1: this is no text file, it holds zero bytes '// &
         '(a case file is plain ASCII or UTF-8)', file_name)
       return
     end if
@@ -149,8 +150,9 @@ contains
       end if
     end if
     default = trim(KEYS(row)%default)
-    if (this%is_deterministic .and. len_trim(KEYS(row)%default_deterministic) > 0) &
+    if (this%is_deterministic .and. len_trim(KEYS(row)%default_deterministic) > 0) then
       default = trim(KEYS(row)%default_deterministic)
+    end if
     allocate (values(count_words(default)))
     do i = 1, size(values)
       values(i)%text = word_at(default, i)
@@ -239,7 +241,7 @@ contains
   subroutine visit_word(this, key, value)
     class(reader_t), intent(inout) :: this
     character(len=*), intent(in) :: key
-    character(len=*), intent(inout) :: value
+    character(len=NAME_LENGTH), intent(inout) :: value
     type(nml_value_t), allocatable :: values(:)
 
     call this%values_of(key, values)
@@ -250,7 +252,7 @@ contains
   subroutine visit_words(this, key, value)
     class(reader_t), intent(inout) :: this
     character(len=*), intent(in) :: key
-    character(len=*), allocatable, intent(inout) :: value(:)
+    character(len=NAME_LENGTH), allocatable, intent(inout) :: value(:)
     type(nml_value_t), allocatable :: values(:)
     integer :: i
 

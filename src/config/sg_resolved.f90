@@ -2,7 +2,7 @@
 !> two such files.
 module sg_resolved
   use sg_check_keys, only: why_not
-  use sg_config, only: config_t
+  use sg_config, only: config_t, NAME_LENGTH
   use sg_config_fields, only: config_visitor_t, visit_config
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_kinds, only: i8, wp
@@ -306,7 +306,7 @@ contains
   subroutine visit_word(this, key, value)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
-    character(len=*), intent(inout) :: value
+    character(len=NAME_LENGTH), intent(inout) :: value
 
     call this%take_one(key, value)
   end subroutine visit_word
@@ -314,7 +314,7 @@ contains
   subroutine visit_words(this, key, value)
     class(writer_t), intent(inout) :: this
     character(len=*), intent(in) :: key
-    character(len=*), allocatable, intent(inout) :: value(:)
+    character(len=NAME_LENGTH), allocatable, intent(inout) :: value(:)
 
     call this%take(key, value)
   end subroutine visit_words

@@ -78,9 +78,10 @@ contains
         closed = token%text
         closed_line = scanner%line
       else if (token%line == closed_line) then
-        call scanner%faults%add(token%line, '&'//closed, 'text after the ''/'' that closes this '// &
-          'group: '//quoted(token%text)//' (text that holds a ''/'' must be in quotes; comments '// &
-          'start with ''!'')')
+        call scanner%faults%add(token%line, '&'//closed, &
+          'text after the ''/'' that closes this '// &
+          'group: '//quoted(token%text)//' (text that holds a ''/'' must be in quotes; '// &
+          'comments start with ''!'')')
       else
         call scanner%faults%add(token%line, '', 'text outside any group: '//quoted(token%text)// &
           ' (a group starts with &name and ends with ''/''; comments start with ''!'')')
@@ -133,7 +134,8 @@ contains
       call scanner%peek(token)
       select case (token%kind)
       case (AT_END)
-        call scanner%faults%add(start%line, scanner%where, 'the ''/'' that closes this group is '// &
+        call scanner%faults%add(start%line, scanner%where, &
+          'the ''/'' that closes this group is '// &
           'missing; the file ends before it')
         return
       case (GROUP)
@@ -162,7 +164,8 @@ contains
         end if
       case default
         call scanner%next(token)
-        call scanner%faults%add(token%line, scanner%where, quoted(token%text)//' stands where a '// &
+        call scanner%faults%add(token%line, scanner%where, quoted(token%text)// &
+          ' stands where a '// &
           'key is expected (write: key = value)')
       end select
     end do
@@ -197,7 +200,8 @@ contains
     call scan_values(scanner, nml, spoilt)
   end subroutine scan_key
 
-  !> Reads values into the newest key of the newest group, up to the next key or the end of the group.
+  !> Reads values into the newest key of the newest group, up to the next key or the end of the
+  !> group.
   subroutine scan_values(scanner, nml, spoilt)
     type(scanner_t), intent(inout) :: scanner
     type(namelist_t), intent(inout) :: nml
@@ -306,7 +310,8 @@ contains
       if (len(fault) > 0 .or. repeats < 1 .or. repeats > MOST_REPEATS .or. &
         (len(value) == 0 .and. .not. in_quotes)) then
         if (.not. entry%spoilt) call scanner%faults%add(token%line, scanner%where, &
-          quoted(token%text)//' is no value with a repeat count (write for instance 3*0.05, with '// &
+          quoted(token%text)//' is no value with a repeat count (write for instance 3*0.05, '// &
+          'with '// &
           'a count from 1 to '//to_text(MOST_REPEATS)//')')
         entry%spoilt = .true.
         return

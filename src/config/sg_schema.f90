@@ -2,7 +2,8 @@
 !> `resolved.nml`, `--keys` and `--defaults` all follow this table.
 !>
 !> Words in `choices` are accepted; words in `later` are known, but belong to a later version and
-!> are refused. A new key needs a row here, a line in `sg_config_fields` and a component of `config_t`.
+!> are refused. A new key needs a row here, a line in `sg_config_fields` and a component of
+!> `config_t`.
 module sg_schema
   implicit none
   private
@@ -134,7 +135,7 @@ module sg_schema
     required=.true., meaning='Poisson''s ratio'), &
     key_t('material', 'friction_angle', KIND_REAL, unit='deg', example='35', range='[0,90)', &
     required=.true., when='model', when_is=FRICTIONAL_MODELS, &
-    meaning='Angle of internal friction; equal to mean of &random_field where the field varies it'), &
+    meaning='Angle of internal friction; equal to mean of &random_field where that varies it'), &
     key_t('material', 'dilation_angle', KIND_REAL, unit='deg', default='0', range='[0,90)', &
     when='model', when_is=FRICTIONAL_MODELS, meaning='Dilation angle, at most friction_angle'), &
     key_t('material', 'cohesion', KIND_REAL, unit='Pa', default='0', range='[0,)', &
@@ -179,8 +180,8 @@ module sg_schema
     key_t('loading', 'damping', KIND_REAL, unit='1/s', default='0', range='[0,)', &
     meaning='Coefficient c_d of the force -c_d m v on the nodes (Eq. 14 of the paper)'), &
     key_t('loading', 'initial_stress', KIND_WORD, default='none', choices='none geostatic', &
-    meaning='none: gravity is switched on; geostatic: in balance with gravity, within the yield '// &
-    'surface')]
+    meaning='none: gravity is switched on; geostatic: in balance with gravity, within the '// &
+    'yield surface')]
 
   type(key_t), parameter :: SOLVER_KEYS(*) = [ &
     key_t('solver', 'weighting', KIND_WORD, default='gimp', choices='linear gimp', &
@@ -257,7 +258,8 @@ module sg_schema
     key_t('output', 'directory', KIND_TEXT, default='runs/<name>', identity=.false., &
     meaning='Directory of the results, made if it is not there; <name> is name of &case'), &
     key_t('output', 'snapshot_interval', KIND_REAL, unit='s', default='0', range='[0,)', &
-    identity=.false., meaning='Time between snapshots of a deterministic or replayed run; 0: none'), &
+    identity=.false., &
+    meaning='Time between snapshots of a deterministic or replayed run; 0: none'), &
     key_t('output', 'history_interval', KIND_REAL, unit='s', default='0', range='[0,)', &
     identity=.false., meaning='Time between rows of the history of such a run; 0: none'), &
     key_t('output', 'snapshot_members', KIND_INTEGER, range='[1,1000000000]', &
