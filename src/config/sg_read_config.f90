@@ -130,7 +130,8 @@ contains
   subroutine values_of(this, key, values)
     class(reader_t), intent(in) :: this
     character(len=*), intent(in) :: key
-    type(nml_value_t), allocatable, intent(out) :: values(:)
+    !> Not allocated before (intent(out) would say so, but makes gfortran 12 warn in vain).
+    type(nml_value_t), allocatable, intent(inout) :: values(:)
     character(len=:), allocatable :: default
     integer :: entry, row, i
 
