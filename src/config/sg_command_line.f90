@@ -3,6 +3,7 @@ module sg_command_line
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_fault_list, only: did_you_mean
   use sg_kinds, only: wp
+  use sg_text, only: lower_case
   implicit none
   private
 
@@ -75,6 +76,7 @@ contains
       end if
       if (options%keys_group /= '') then
         if (options%keys_group(1:1) == '&') options%keys_group = options%keys_group(2:)
+        options%keys_group = lower_case(options%keys_group)
       end if
     case ('--json')
       options%json = .true.
