@@ -9,6 +9,10 @@
 !> al. 2022)
 !> map_force:      f_i -= V_p sigma_p grad S                                  (Eq. 5)
 !> gather:         a_p = sum S motion_i;  L_p = sum motion_i(3:4) (x) grad S
+!>
+!> Nodes are counted along rows: node (i, j) is i + j (nx + 1). What a point brings to the nodes is laid
+!> out for the whole block first: vectors put together from numbers just computed would stall the
+!> loads behind them.
 module sg_transfer
   use sg_kinds, only: wp
   use sg_weighting, only: BLOCK, weights_t
@@ -24,20 +28,26 @@ contains
   pure subroutine map_momentum(n, w, mass, vx, vy, nx, ny, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
+    !> [n], kg/m and m/s.
     real(wp), intent(in) :: mass(n), vx(n), vy(n)
+    !> Last node in each direction.
     integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
-    real(wp) :: a(4), s
-    integer :: p, i, j, k
+    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    real(wp) :: a(4, BLOCK), along_row(4)
+    integer :: p, i, j, k, node
 
+    call pack_momentum(n, mass, vx, vy, a)
     do p = 1, n
-      a = [mass(p), mass(p)*vx(p), mass(p)*vy(p), 0.0_wp]
       do j = 1, 3
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
+        !$omp simd
+        do k = 1, 4
+          along_row(k) = w%sy(p, j)*a(k, p)
+        end do
         do i = 1, 3
-          s = w%sx(p, i)*w%sy(p, j)
+          !$omp simd
           do k = 1, 4
-            total(k, w%i(p) + i - 1, w%j(p) + j - 1) = total(k, w%i(p) + i - 1, w%j(p) + j &
-              - 1) + s*a(k)
+            total(k, node + i) = total(k, node + i) + w%sx(p, i)*along_row(k)
           end do
         end do
       end do
@@ -48,23 +58,27 @@ contains
   pure subroutine map_force(n, w, volume, sxx, syy, sxy, nx, ny, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
+    !> [n], m^2 and Pa.
     real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
-    real(wp) :: b(2), c(2), along_x(2), along_y(2)
-    integer :: p, i, j, k
+    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    real(wp) :: b(4, BLOCK), c(4, BLOCK), along_x(4), along_y(4)
+    integer :: p, i, j, k, node
 
+    call pack_force(n, volume, sxx, syy, sxy, b, c)
     do p = 1, n
-      b = -volume(p)*[sxx(p), sxy(p)]
-      c = -volume(p)*[sxy(p), syy(p)]
       do j = 1, 3
-        along_x = w%sy(p, j)*b
-        along_y = w%gy(p, j)*c
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
+        !$omp simd
+        do k = 1, 4
+          along_x(k) = w%sy(p, j)*b(k, p)
+          along_y(k) = w%gy(p, j)*c(k, p)
+        end do
         do i = 1, 3
-          do k = 1, 2
-            total(4 + k, w%i(p) + i - 1, w%j(p) + j - 1) = total(4 + k, w%i(p) + i - 1, w%j(p) &
-              + j - 1) &
-              + w%gx(p, i)*along_x(k) + w%sx(p, i)*along_y(k)
+          !$omp simd
+          do k = 1, 4
+            total(4 + k, node + i) = total(4 + k, node + i) &
+              + (w%gx(p, i)*along_x(k) + w%sx(p, i)*along_y(k))
           end do
         end do
       end do
@@ -77,13 +91,42 @@ contains
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
-    ! What S_x S_y multiplies in the first half of a node, and S_x' S_y and S_x S_y' in the second.
-    ! Laid out for
-    ! all points first: vectors put together from numbers just computed would stall the loads
-    ! behind them.
-    real(wp) :: a(4, BLOCK), b(4, BLOCK), c(4, BLOCK), momentum(4), along_x(4), along_y(4)
-    integer :: p, i, j, k, first, row
+    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    real(wp) :: a(4, BLOCK), b(4, BLOCK), c(4, BLOCK), along_row(4), along_x(4), along_y(4)
+    integer :: p, i, j, k, node
+
+    call pack_momentum(n, mass, vx, vy, a)
+    call pack_force(n, volume, sxx, syy, sxy, b, c)
+    do p = 1, n
+      do j = 1, 3
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
+        !$omp simd
+        do k = 1, 4
+          along_row(k) = w%sy(p, j)*a(k, p)
+          along_x(k) = w%sy(p, j)*b(k, p)
+          along_y(k) = w%gy(p, j)*c(k, p)
+        end do
+        do i = 1, 3
+          !$omp simd
+          do k = 1, 4
+            total(k, node + i) = total(k, node + i) + w%sx(p, i)*along_row(k)
+          end do
+          !$omp simd
+          do k = 1, 4
+            total(4 + k, node + i) = total(4 + k, node + i) &
+              + (w%gx(p, i)*along_x(k) + w%sx(p, i)*along_y(k))
+          end do
+        end do
+      end do
+    end do
+  end subroutine map_momentum_and_force
+
+  !> What S_x S_y multiplies in the first half of a node.
+  pure subroutine pack_momentum(n, mass, vx, vy, a)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: mass(n), vx(n), vy(n)
+    real(wp), intent(inout) :: a(4, BLOCK)
+    integer :: p
 
     !$omp simd
     do p = 1, n
@@ -91,6 +134,18 @@ contains
       a(2, p) = mass(p)*vx(p)
       a(3, p) = mass(p)*vy(p)
       a(4, p) = 0.0_wp
+    end do
+  end subroutine pack_momentum
+
+  !> What S_x' S_y (b) and S_x S_y' (c) multiply in the second half of a node.
+  pure subroutine pack_force(n, volume, sxx, syy, sxy, b, c)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(inout) :: b(4, BLOCK), c(4, BLOCK)
+    integer :: p
+
+    !$omp simd
+    do p = 1, n
       b(1, p) = -volume(p)*sxx(p)
       b(2, p) = -volume(p)*sxy(p)
       b(3, p) = 0.0_wp
@@ -100,83 +155,59 @@ contains
       c(3, p) = 0.0_wp
       c(4, p) = 0.0_wp
     end do
-    do p = 1, n
-      first = w%i(p) - 1
-      row = w%j(p) - 1
-      do j = 1, 3
-        !$omp simd
-        do k = 1, 4
-          momentum(k) = w%sy(p, j)*a(k, p)
-          along_x(k) = w%sy(p, j)*b(k, p)
-          along_y(k) = w%gy(p, j)*c(k, p)
-        end do
-        do i = 1, 3
-          !$omp simd
-          do k = 1, 4
-            total(k, first + i, row + j) = total(k, first + i, row + j) + w%sx(p, i)*momentum(k)
-          end do
-          !$omp simd
-          do k = 1, 4
-            total(4 + k, first + i, row + j) = total(4 + k, first + i, row + j) &
-              + (w%gx(p, i)*along_x(k) + w%sx(p, i)*along_y(k))
-          end do
-        end do
-      end do
-    end do
-  end subroutine map_momentum_and_force
+  end subroutine pack_force
 
   !> value(:, p) = sum of S times motion.
   pure subroutine gather_motion(n, w, nx, ny, motion, value)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     integer, intent(in) :: nx, ny
-    real(wp), intent(in) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(in) :: motion(4, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(4, BLOCK)
-    real(wp) :: row(4), v(4)
-    integer :: p, i, j, k
+    real(wp) :: v(4)
+    integer :: p, j, k, node
 
     do p = 1, n
       v = 0.0_wp
       do j = 1, 3
-        row = 0.0_wp
-        do i = 1, 3
-          do k = 1, 4
-            row(k) = row(k) + w%sx(p, i)*motion(k, w%i(p) + i - 1, w%j(p) + j - 1)
-          end do
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1)
+        !$omp simd
+        do k = 1, 4
+          v(k) = v(k) + w%sy(p, j)*(w%sx(p, 1)*motion(k, node) + w%sx(p, 2)*motion(k, node + 1) &
+            + w%sx(p, 3)*motion(k, node + 2))
         end do
-        v = v + w%sy(p, j)*row
       end do
       value(:, p) = v
     end do
   end subroutine gather_motion
 
-  !> As gather_motion; also gradient(:, p) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy) of v =
-  !> motion(3:4), in 1/s.
+  !> As gather_motion; also gradient(:, p) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy) of v = motion(3:4),
+  !> in 1/s.
   pure subroutine gather_motion_and_gradient(n, w, nx, ny, motion, value, gradient)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     integer, intent(in) :: nx, ny
-    real(wp), intent(in) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(in) :: motion(4, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(4, BLOCK), gradient(4, BLOCK)
-    real(wp) :: row(4), slope(4), v(4), gx(4), gy(4)
-    integer :: p, i, j, k
+    real(wp) :: row, slope, v(4), gx(4), gy(4)
+    integer :: p, j, k, node
 
     do p = 1, n
       v = 0.0_wp
       gx = 0.0_wp
       gy = 0.0_wp
       do j = 1, 3
-        row = 0.0_wp
-        slope = 0.0_wp
-        do i = 1, 3
-          do k = 1, 4
-            row(k) = row(k) + w%sx(p, i)*motion(k, w%i(p) + i - 1, w%j(p) + j - 1)
-            slope(k) = slope(k) + w%gx(p, i)*motion(k, w%i(p) + i - 1, w%j(p) + j - 1)
-          end do
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1)
+        !$omp simd private(row, slope)
+        do k = 1, 4
+          row = w%sx(p, 1)*motion(k, node) + w%sx(p, 2)*motion(k, node + 1) &
+            + w%sx(p, 3)*motion(k, node + 2)
+          slope = w%gx(p, 1)*motion(k, node) + w%gx(p, 2)*motion(k, node + 1) &
+            + w%gx(p, 3)*motion(k, node + 2)
+          v(k) = v(k) + w%sy(p, j)*row
+          gx(k) = gx(k) + w%sy(p, j)*slope
+          gy(k) = gy(k) + w%gy(p, j)*row
         end do
-        v = v + w%sy(p, j)*row
-        gx = gx + w%sy(p, j)*slope
-        gy = gy + w%gy(p, j)*row
       end do
       value(:, p) = v
       gradient(1:2, p) = gx(3:4)
