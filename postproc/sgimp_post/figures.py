@@ -276,16 +276,18 @@ def configuration_figure(snapshot, geometry):
         gridspec_kw={"width_ratios": widths},
     )
     angles = np.concatenate([state.friction_angle for state in states])
-    middle = float(np.mean(angles))
+    angles = angles[np.isfinite(angles)]
+    middle = float(np.mean(angles)) if len(angles) else 0.0
     # Homogeneous ground (to within the jitter of its strength) has one colour and no bar.
-    is_uniform = float(np.ptp(angles)) < 1e-2
+    is_uniform = len(angles) == 0 or float(np.ptp(angles)) < 1e-2
     spread = 3.0 * float(np.std(angles)) if not is_uniform else 1.0
     spacing = geometry.point_spacing or right / 150
     for axis, state, width in zip(axes[0], states, widths):
         points = 11.5 * 72 * 0.84 / sum(widths) * spacing
         tint = {"color": OTHER} if is_uniform else {
             "c": state.friction_angle,
-            "cmap": "RdYlBu_r",
+            "cmap": matplotlib.colormaps["RdYlBu_r"].with_extremes(bad="#B4BEC6"),
+            "plotnonfinite": True,
             "vmin": middle - spread,
             "vmax": middle + spread,
         }

@@ -16,6 +16,8 @@ module sg_particles
     integer :: material
     !> Full width and height of a point, in m; it does not change (uGIMP).
     real(wp) :: width, height
+    !> Its points are what runouts, heights and the profile are measured on.
+    logical :: is_measured = .true.
   end type body_points_t
 
   type :: particles_t
@@ -41,6 +43,7 @@ module sg_particles
     real(wp), allocatable :: plastic_strain(:)
   contains
     procedure :: init => init_particles
+    procedure :: is_measured
     procedure :: has_plastic_strain
   end type particles_t
 
@@ -67,6 +70,17 @@ contains
     this%tension_limit = 0.0_wp; this%friction_angle = 0.0_wp
     this%plastic_strain = 0.0_wp
   end subroutine init_particles
+
+  !> Mask of the points of measured bodies, [count].
+  pure function is_measured(this) result(mask)
+    class(particles_t), intent(in) :: this
+    logical :: mask(this%count)
+    integer :: body
+
+    do body = 1, size(this%bodies)
+      mask(this%bodies(body)%first:this%bodies(body)%last) = this%bodies(body)%is_measured
+    end do
+  end function is_measured
 
   !> Is the plastic strain kept?
   pure function has_plastic_strain(this) result(has)

@@ -1,6 +1,7 @@
 !> What is measured on a state of the points: runout by four definitions, heights, profile,
 !> energies.
-!> Runouts are measured from the initial toe of the bodies, in m, towards +x.
+!> Runouts are measured from the initial toe of the measured bodies, in m, towards +x: those of the material that
+!> the random field varies, all bodies where there is none.
 module sg_runout
   use sg_kinds, only: sp, wp
   use sg_materials, only: material_t
@@ -23,6 +24,7 @@ contains
     x = -huge(1.0_wp)
     do body = 1, size(particles%bodies)
       associate (b => particles%bodies(body))
+        if (.not. b%is_measured) cycle
         x = max(x, maxval(particles%x(b%first:b%last)) + 0.5_wp*b%width)
       end associate
     end do
@@ -35,19 +37,22 @@ contains
     type(particles_t), intent(in) :: particles
     real(wp), intent(in) :: shares(:)
     real(wp) :: x(size(shares))
-    integer :: order(particles%count)
+    real(wp), allocatable :: position(:), mass(:)
+    integer, allocatable :: order(:)
     real(wp) :: total, summed
     integer :: k, s
 
-    order = sort_index(particles%x)
-    total = sum(particles%mass)
+    position = pack(particles%x, particles%is_measured())
+    mass = pack(particles%mass, particles%is_measured())
+    order = sort_index(position)
+    total = sum(mass)
     do s = 1, size(shares)
       summed = 0.0_wp
-      do k = particles%count, 1, -1
-        summed = summed + particles%mass(order(k))
+      do k = size(order), 2, -1
+        summed = summed + mass(order(k))
         if (summed > (1.0_wp - shares(s))*total) exit
       end do
-      x(s) = particles%x(order(max(k, 1)))
+      x(s) = position(order(max(k, 1)))
     end do
   end function mass_front
 
@@ -64,6 +69,7 @@ contains
 
     total = 0.0_wp
     do body = 1, size(particles%bodies)
+      if (.not. particles%bodies(body)%is_measured) cycle
       density = materials(particles%bodies(body)%material)%density
       do p = particles%bodies(body)%first, particles%bodies(body)%last
         k = floor((particles%x(p) - x_min)/column_width) + 1
@@ -102,6 +108,7 @@ contains
     y = y_base
     do body = 1, size(particles%bodies)
       associate (b => particles%bodies(body))
+        if (.not. b%is_measured) cycle
         y = max(y, 0.5_wp*b%height + maxval(particles%y(b%first:b%last), &
                 mask=particles%x(b%first:b%last) >= x_first &
                 .and. particles%x(b%first:b%last) <= x_last))

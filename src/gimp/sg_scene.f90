@@ -1,5 +1,6 @@
 !> A scene: everything that all members of an ensemble share. It is built once and never changes.
 module sg_scene
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use sg_bodies, only: body_extent, fill_body, body_lattice_t
   use sg_config, only: config_t
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
@@ -16,9 +17,9 @@ module sg_scene
     type(material_t), allocatable :: materials(:)
     !> Points at their first place with their first velocity and the stress of the ground, if any.
     type(particles_t) :: particles
-    !> Position of the toe that runouts are measured from: the right end of the bodies, in m.
+    !> Position of the toe that runouts are measured from: the right end of the measured bodies, in m.
     real(wp) :: toe
-    !> Extent of all bodies in m: x_min, x_max, y_min, y_max.
+    !> Extent of the measured bodies in m: x_min, x_max, y_min, y_max.
     real(wp) :: extent(4)
     !> Total mass in kg/m.
     real(wp) :: mass
@@ -119,6 +120,9 @@ contains
       p%bodies(k)%material = material
       p%bodies(k)%width = lattice%width
       p%bodies(k)%height = lattice%height
+      if (config%has_random_field) then
+        p%bodies(k)%is_measured = material == config%random_field%material_index
+      end if
       p%x(first:last) = lattice%x
       p%y(first:last) = lattice%y
       p%x_start(first:last) = lattice%x
@@ -127,7 +131,10 @@ contains
       p%vy(first:last) = config%bodies(k)%velocity(2)
       p%volume(first:last) = lattice%width*lattice%height
       p%mass(first:last) = lattice%width*lattice%height*scene%materials(material)%density
-      p%friction_angle(first:last) = scene%materials(material)%friction_angle
+      p%friction_angle(first:last) = ieee_value(1.0_wp, ieee_quiet_nan)
+      if (scene%materials(material)%model == MODEL_MOHR_COULOMB) then
+        p%friction_angle(first:last) = scene%materials(material)%friction_angle
+      end if
     end associate
   end subroutine place_body
 
@@ -182,6 +189,7 @@ contains
     scene%wave_speed = 0.0_wp
     do k = 1, size(config%bodies)
       box = body_extent(config%bodies(k))
+      if (.not. scene%particles%bodies(k)%is_measured) box = scene%extent
       scene%extent(1::2) = min(scene%extent(1::2), box(1::2))
       scene%extent(2::2) = max(scene%extent(2::2), box(2::2))
       scene%speed = max(scene%speed, norm2(config%bodies(k)%velocity))

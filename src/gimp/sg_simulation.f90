@@ -1,6 +1,7 @@
 !> One member from its initial state to rest: the time loop, the end conditions, the failures, the
 !> measures.
 module sg_simulation
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use sg_config, only: config_t
   use sg_kinds, only: sp, wp
   use sg_initial_stress, only: make_admissible
@@ -323,6 +324,7 @@ contains
     type(clock_t), intent(in) :: clock
     type(outcome_t), intent(inout) :: outcome
     real(wp) :: front(2), potential, scale, point_depth, cell
+    real(wp), allocatable :: angles(:)
     logical :: touched
 
     cell = config%grid%cell_size
@@ -352,9 +354,12 @@ contains
         + solver%damping_work &
         - clock%energy_at_start)/scale
       v(MASS_ERROR) = sum(s%mass)/scene%mass - 1.0_wp
-      v(FIELD_MEAN) = sum(s%friction_angle)/s%count
-      v(FIELD_MIN) = minval(s%friction_angle)
-      v(FIELD_MAX) = maxval(s%friction_angle)
+      angles = pack(s%friction_angle, s%is_measured() .and. ieee_is_finite(s%friction_angle))
+      if (size(angles) > 0) then
+        v(FIELD_MEAN) = sum(angles)/size(angles)
+        v(FIELD_MIN) = minval(angles)
+        v(FIELD_MAX) = maxval(angles)
+      end if
     end associate
   end subroutine measure
 end module sg_simulation

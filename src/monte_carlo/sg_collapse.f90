@@ -4,6 +4,7 @@ module sg_collapse
   use sg_config, only: config_t
   use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
+  use sg_materials, only: MODEL_MOHR_COULOMB
   use sg_member_model, only: member_model_t
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
@@ -151,9 +152,13 @@ contains
     end if
     material = this%config%bodies(1)%material_index
     if (this%config%has_random_field) material = this%config%random_field%material_index
-    friction = friction*merge(this%plan%cases(case_index)%mean, &
-      this%scene%materials(material)%friction_angle, &
-                              this%config%has_random_field)
+    if (this%config%has_random_field) then
+      friction = friction*this%plan%cases(case_index)%mean
+    else if (id > 1 .and. this%scene%materials(material)%model == MODEL_MOHR_COULOMB) then
+      friction = friction*this%scene%materials(material)%friction_angle
+    else
+      return
+    end if
     variation%material = material
     allocate (variation%friction_angle(this%scene%point_count(material)))
     variation%friction_angle = friction
