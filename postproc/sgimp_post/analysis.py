@@ -54,7 +54,9 @@ def _totals(ensemble) -> dict:
         "ok": ok,
         "failed": sum(int(case.failed.sum()) for case in cases),
         "unsettled": sum(int((case.column("settled")[case.ok] == 0).sum()) for case in cases),
-        "wall_touched": sum(int((case.column("wall_touched")[case.ok] == 1).sum()) for case in cases),
+        "wall_touched": sum(
+            int((case.column("wall_touched")[case.ok] == 1).sum()) for case in cases
+        ),
         "used": sum(case.count for case in ensemble.for_statistics()),
     }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Optional
 
 import h5py
 import numpy as np
@@ -72,8 +71,8 @@ class Case:
     units: dict
     reason: list
     #: Cell centres [nx] and deposit depth [N, nx], in m; both None if not in the file.
-    profile_x: Optional[np.ndarray] = None
-    profile_height: Optional[np.ndarray] = None
+    profile_x: np.ndarray | None = None
+    profile_height: np.ndarray | None = None
 
     @property
     def count(self) -> int:
@@ -117,15 +116,15 @@ class Case:
 class Geometry:
     """Where the body stood and how large the grid is, in m; None if the file does not say."""
 
-    toe: Optional[float] = None
-    initial_height: Optional[float] = None
-    initial_width: Optional[float] = None
-    x_min: Optional[float] = None
-    x_max: Optional[float] = None
-    y_min: Optional[float] = None
-    y_max: Optional[float] = None
-    cell_size: Optional[float] = None
-    point_spacing: Optional[float] = None
+    toe: float | None = None
+    initial_height: float | None = None
+    initial_width: float | None = None
+    x_min: float | None = None
+    x_max: float | None = None
+    y_min: float | None = None
+    y_max: float | None = None
+    cell_size: float | None = None
+    point_spacing: float | None = None
 
 
 @dataclass(frozen=True)
@@ -176,8 +175,11 @@ def _read_file(directory: Path, path: Path, file: h5py.File) -> Ensemble:
         raise PostError(f"{path}: not a results file of sgimp (no program='sgimp' or no /cases)")
     geometry = Geometry()
     if "geometry" in file:
-        known = {name: float(value) for name, value in file["geometry"].attrs.items()
-                 if name in Geometry.__dataclass_fields__}
+        known = {
+            name: float(value)
+            for name, value in file["geometry"].attrs.items()
+            if name in Geometry.__dataclass_fields__
+        }
         geometry = Geometry(**known)
     cases = [_read_case(path, label, group) for label, group in file["cases"].items()]
     cases.sort(key=lambda case: (case.order, case.label))
@@ -230,8 +232,10 @@ def _read_case(path: Path, label: str, group: h5py.Group) -> Case:
 def _column(path: Path, label: str, dataset: h5py.Dataset, count: int) -> np.ndarray:
     values = dataset[...].reshape(-1)
     if len(values) != count:
-        raise PostError(f"{path}: case {label}: {len(values)} rows of "
-                        f"{dataset.name.rsplit('/', 1)[-1]} for {count} members")
+        raise PostError(
+            f"{path}: case {label}: {len(values)} rows of "
+            f"{dataset.name.rsplit('/', 1)[-1]} for {count} members"
+        )
     return values
 
 
@@ -243,8 +247,10 @@ def _read_profile(path: Path, label: str, group: h5py.Group, count: int):
     if height.size == 0:
         height = np.empty((0, len(x)))
     if height.shape != (count, len(x)):
-        raise PostError(f"{path}: case {label}: profile/height has shape {height.shape}, "
-                        f"expected {(count, len(x))}")
+        raise PostError(
+            f"{path}: case {label}: profile/height has shape {height.shape}, "
+            f"expected {(count, len(x))}"
+        )
     return x, height
 
 

@@ -166,9 +166,13 @@ def _exceedance(axis, cases, name, deterministic):
             smallest = min(smallest, curve.probability[drawn].min())
         tint = colour(case)
         if len(cases) <= 3:
-            axis.fill_between(curve.x, np.maximum(curve.low, 1e-6), curve.high, color=tint, alpha=0.15, lw=0)
+            axis.fill_between(
+                curve.x, np.maximum(curve.low, 1e-6), curve.high, color=tint, alpha=0.15, lw=0
+            )
         dash = {0.1: "--", 0.15: ":"}.get(round(case.cov, 3), "-")
-        axis.plot(curve.x[drawn], curve.probability[drawn], color=tint, ls=dash, lw=1.5, label=case.label)
+        axis.plot(
+            curve.x[drawn], curve.probability[drawn], color=tint, ls=dash, lw=1.5, label=case.label
+        )
     axis.set_yscale("log")
     axis.set_ylim(0.5 * smallest, 1.3)
     axis.set_ylabel("P(runout > x), Wilson 95 %")
@@ -194,7 +198,9 @@ def study_figure(summary: dict):
     figure, axes = plt.subplots(1, 3, figsize=(11.5, 3.3))
     acfs = sorted({case["acf"] for case in summary["cases"]})
     for k, acf in enumerate(acfs):
-        rows = sorted((case for case in summary["cases"] if case["acf"] == acf), key=lambda c: c["cov"])
+        rows = sorted(
+            (case for case in summary["cases"] if case["acf"] == acf), key=lambda c: c["cov"]
+        )
         x = np.array([row["cov"] for row in rows]) + 0.0012 * (k - 0.5 * (len(acfs) - 1))
         for axis, value, low, high in (
             (axes[0], "mean", "mean_low", "mean_high"),
@@ -204,7 +210,9 @@ def study_figure(summary: dict):
             y = np.array([row[value] for row in got])
             span = [y - [row[low] for row in got], [row[high] for row in got] - y]
             tint = ACF_COLOURS.get(acf, OTHER)
-            axis.errorbar(x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper())
+            axis.errorbar(
+                x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper()
+            )
         shares = [row["exceedance"] for row in rows]
         y = np.array([row["value"] for row in shares])
         span = [y - [row["low"] for row in shares], [row["high"] for row in shares] - y]
@@ -272,7 +280,10 @@ def configuration_figure(snapshot, geometry):
     top = max(state.position[:, 1].max() for state in states)
     widths = [state.position[:, 0].max() for state in states]
     figure, axes = plt.subplots(
-        1, len(states), figsize=(11.5, 1.15 + 9.6 * top / sum(widths)), squeeze=False,
+        1,
+        len(states),
+        figsize=(11.5, 1.15 + 9.6 * top / sum(widths)),
+        squeeze=False,
         gridspec_kw={"width_ratios": widths},
     )
     angles = np.concatenate([state.friction_angle for state in states])
@@ -284,13 +295,17 @@ def configuration_figure(snapshot, geometry):
     spacing = geometry.point_spacing or right / 150
     for axis, state, width in zip(axes[0], states, widths):
         points = 11.5 * 72 * 0.84 / sum(widths) * spacing
-        tint = {"color": OTHER} if is_uniform else {
-            "c": state.friction_angle,
-            "cmap": matplotlib.colormaps["RdYlBu_r"].with_extremes(bad="#B4BEC6"),
-            "plotnonfinite": True,
-            "vmin": middle - spread,
-            "vmax": middle + spread,
-        }
+        tint = (
+            {"color": OTHER}
+            if is_uniform
+            else {
+                "c": state.friction_angle,
+                "cmap": matplotlib.colormaps["RdYlBu_r"].with_extremes(bad="#B4BEC6"),
+                "plotnonfinite": True,
+                "vmin": middle - spread,
+                "vmax": middle + spread,
+            }
+        )
         drawn = axis.scatter(
             *state.position.T, s=max(points**2 * 0.9, 0.3), marker="s", lw=0, **tint
         )

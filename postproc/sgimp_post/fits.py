@@ -53,9 +53,14 @@ def fit_laws(values) -> list:
         return fits
     best = min(known)
     total = sum(np.exp(-0.5 * (aic - best)) for aic in known)
-    return [replace(fit, delta_aic=fit.aic - best,
-                    weight=float(np.exp(-0.5 * (fit.aic - best)) / total))
-            if np.isfinite(fit.aic) else fit for fit in fits]
+    return [
+        replace(
+            fit, delta_aic=fit.aic - best, weight=float(np.exp(-0.5 * (fit.aic - best)) / total)
+        )
+        if np.isfinite(fit.aic)
+        else fit
+        for fit in fits
+    ]
 
 
 def best_fit(fits):
@@ -96,9 +101,12 @@ def _fit(law: str, x: np.ndarray) -> Fit:
     log_likelihood = float(np.sum(distribution_of(fit).logpdf(x)))
     if not np.isfinite(log_likelihood):
         return replace(fit, parameters={}, note="no maximum found")
-    return replace(fit, log_likelihood=log_likelihood,
-                   aic=2.0 * PARAMETERS - 2.0 * log_likelihood,
-                   bic=PARAMETERS * float(np.log(n)) - 2.0 * log_likelihood)
+    return replace(
+        fit,
+        log_likelihood=log_likelihood,
+        aic=2.0 * PARAMETERS - 2.0 * log_likelihood,
+        bic=PARAMETERS * float(np.log(n)) - 2.0 * log_likelihood,
+    )
 
 
 def _estimate(law: str, x: np.ndarray) -> dict:
@@ -122,5 +130,6 @@ def _estimate(law: str, x: np.ndarray) -> dict:
 
 def _tight(function, start, args=(), disp=0):
     """Nelder-Mead to rounding: scipy's default stops at 1e-4, which shows in AIC."""
-    return optimize.fmin(function, start, args=args, disp=disp,
-                         xtol=1e-10, ftol=1e-12, maxiter=4000, maxfun=8000)
+    return optimize.fmin(
+        function, start, args=args, disp=disp, xtol=1e-10, ftol=1e-12, maxiter=4000, maxfun=8000
+    )

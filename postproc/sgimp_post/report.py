@@ -29,16 +29,20 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
     drawn = _figures(ensemble, summary)
-    html = _environment().get_template("report.html.j2").render(
-        **drawn,
-        s=summary,
-        a=ensemble.attributes,
-        directory=Path(directory),
-        verdict=verdict(summary),
-        warnings=warnings(summary),
-        runouts=RUNOUTS,
-        laws=LAWS,
-        post_version=__version__,
+    html = (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            **drawn,
+            s=summary,
+            a=ensemble.attributes,
+            directory=Path(directory),
+            verdict=verdict(summary),
+            warnings=warnings(summary),
+            runouts=RUNOUTS,
+            laws=LAWS,
+            post_version=__version__,
+        )
     )
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
@@ -89,9 +93,7 @@ def _case_sentence(case: dict, summary: dict) -> str:
         return f"{case['label']}: no member has ended well yet."
     text = f"{case['label']}: mean {runout['mean']:.3f} m"
     if runout["n"] > 1:
-        text += (
-            f" (95 %: {runout['mean_low']:.3f} to {runout['mean_high']:.3f}), sd {runout['sd']:.3f} m"
-        )
+        text += f" (95 %: {runout['mean_low']:.3f} to {runout['mean_high']:.3f}), sd {runout['sd']:.3f} m"
     if share["n"]:
         text += (
             f"; {100 * share['value']:.0f} % run farther than homogeneous ground"
@@ -111,9 +113,7 @@ def _study_sentence(summary: dict) -> str:
         return "No heterogeneous member has ended well yet."
     means = [case["runouts"][name]["mean"] for case in rows]
     shares = [case["exceedance"]["value"] for case in rows if case["exceedance"]["n"]]
-    text = (
-        f"Heterogeneous ground, {len(rows)} cases: means from {min(means):.3f} m to {max(means):.3f} m"
-    )
+    text = f"Heterogeneous ground, {len(rows)} cases: means from {min(means):.3f} m to {max(means):.3f} m"
     if shares:
         text += (
             f"; between {100 * min(shares):.0f} % and {100 * max(shares):.0f} % of the members run"
@@ -135,7 +135,9 @@ def warnings(summary: dict) -> list:
             f"{totals['unsettled']} members were still moving at end_time; their runout is a lower bound."
         )
     if totals["wall_touched"]:
-        found.append(f"{totals['wall_touched']} members touched a wall; it may have cut their runout short.")
+        found.append(
+            f"{totals['wall_touched']} members touched a wall; it may have cut their runout short."
+        )
     inside = [case["label"] for case in summary["cases"] if case["shift_below_noise"]]
     if inside:
         found.append(
@@ -196,7 +198,10 @@ def _configurations(ensemble) -> list:
 
 def _environment() -> jinja2.Environment:
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("sgimp_post"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+        loader=jinja2.PackageLoader("sgimp_post"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters["number"] = _number
     environment.filters["percent"] = lambda value: _number(100.0 * value, 1)
@@ -222,7 +227,18 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
                 writer.writerow([case.label, int(case.id[k]), status, *row, case.reason[k]])
     with open(directory / "summary.csv", "w", newline="") as file:
         writer = csv.writer(file)
-        statistics = ("n", "mean", "mean_low", "mean_high", "sd", "sd_low", "sd_high", "p05", "median", "p95")
+        statistics = (
+            "n",
+            "mean",
+            "mean_low",
+            "mean_high",
+            "sd",
+            "sd_low",
+            "sd_high",
+            "p05",
+            "median",
+            "p95",
+        )
         writer.writerow(["case", "runout", *statistics])
         rows = [("deterministic", summary["deterministic"])]
         rows += [(case["label"], case["runouts"]) for case in summary["cases"]]
@@ -231,13 +247,26 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
                 writer.writerow([label, name, *(runouts[name][key] for key in statistics)])
     with open(directory / "fits.csv", "w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(["case", "law", "n", "k", "log_likelihood", "aic", "bic", "parameters", "note"])
+        writer.writerow(
+            ["case", "law", "n", "k", "log_likelihood", "aic", "bic", "parameters", "note"]
+        )
         for case in summary["cases"]:
             for fit in case["fits"]:
-                parameters = " ".join(f"{key}={value!r}" for key, value in fit["parameters"].items())
+                parameters = " ".join(
+                    f"{key}={value!r}" for key, value in fit["parameters"].items()
+                )
                 writer.writerow(
-                    [case["label"], fit["law"], fit["n"], fit["k"], fit["log_likelihood"], fit["aic"],
-                     fit["bic"], parameters, fit["note"]]
+                    [
+                        case["label"],
+                        fit["law"],
+                        fit["n"],
+                        fit["k"],
+                        fit["log_likelihood"],
+                        fit["aic"],
+                        fit["bic"],
+                        parameters,
+                        fit["note"],
+                    ]
                 )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Optional
 
 import h5py
 import numpy as np
@@ -29,8 +28,8 @@ class Snapshot:
     label: str
     id: int
     #: None if step 0 is not in the file.
-    initial: Optional[State]
-    final: Optional[State]
+    initial: State | None
+    final: State | None
     #: Columns of /history by name; empty if there is none.
     history: dict = field(default_factory=dict)
 
@@ -45,7 +44,7 @@ def find_snapshots(directory: Path) -> list:
     return sorted(found, key=lambda entry: entry[:2])
 
 
-def read_snapshot(label: str, member: int, path: Path) -> Optional[Snapshot]:
+def read_snapshot(label: str, member: int, path: Path) -> Snapshot | None:
     """None for a file that cannot be read: a member may be writing it at this moment."""
     try:
         with h5py.File(path, "r") as file:
@@ -69,7 +68,10 @@ def _read_state(file: h5py.File, step: int, name: str) -> State:
     if position.ndim != 2 or position.shape[1] != 2:
         raise ValueError("position is not [np, 2]")
     time = float(np.ravel(group["time"][...])[0]) if "time" in group else np.nan
-    angle = (group["friction_angle"][...].astype(float).reshape(-1)
-             if "friction_angle" in group else np.full(len(position), np.nan))
+    angle = (
+        group["friction_angle"][...].astype(float).reshape(-1)
+        if "friction_angle" in group
+        else np.full(len(position), np.nan)
+    )
     keep = np.isfinite(position).all(axis=1)
     return State(step, time, position[keep], angle[keep])

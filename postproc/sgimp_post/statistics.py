@@ -92,8 +92,20 @@ def describe(values, confidence: float = CONFIDENCE) -> Description:
     half = _t_factor(n, confidence) * sd / np.sqrt(n)
     low, high = _sd_factors(n, confidence)
     p05, median, p95 = (float(q) for q in np.percentile(x, [5, 50, 95]))
-    return Description(n, mean, mean - half, mean + half, sd, sd * low, sd * high,
-                       float(x.min()), p05, median, p95, float(x.max()))
+    return Description(
+        n,
+        mean,
+        mean - half,
+        mean + half,
+        sd,
+        sd * low,
+        sd * high,
+        float(x.min()),
+        p05,
+        median,
+        p95,
+        float(x.max()),
+    )
 
 
 def wilson(count: int, n: int, confidence: float = CONFIDENCE) -> Proportion:
@@ -140,8 +152,9 @@ def welch_difference(first, second, confidence: float = CONFIDENCE) -> Differenc
         return Difference(n, mean, mean, mean, 1.0 if mean == 0.0 else 0.0)
     freedom = (va + vb) ** 2 / (va**2 / (len(a) - 1) + vb**2 / (len(b) - 1))
     half = float(stats.t.ppf(0.5 + 0.5 * confidence, freedom)) * error
-    return Difference(n, mean, mean - half, mean + half,
-                      float(2.0 * stats.t.sf(abs(mean) / error, freedom)))
+    return Difference(
+        n, mean, mean - half, mean + half, float(2.0 * stats.t.sf(abs(mean) / error, freedom))
+    )
 
 
 def holm(p_values) -> np.ndarray:
@@ -171,8 +184,9 @@ def running(values, confidence: float = CONFIDENCE, points: int = 240) -> Runnin
         sd = np.where(count > 1, np.sqrt(variance), np.nan)
         half = _t_factor(count, confidence) * sd / np.sqrt(count)
         low, high = _sd_factors(count, confidence)
-    return Running(count, mean + shift, mean + shift - half, mean + shift + half,
-                   sd, sd * low, sd * high)
+    return Running(
+        count, mean + shift, mean + shift - half, mean + shift + half, sd, sd * low, sd * high
+    )
 
 
 def exceedance(values, confidence: float = CONFIDENCE, points: int = 160) -> Exceedance:
@@ -181,11 +195,18 @@ def exceedance(values, confidence: float = CONFIDENCE, points: int = 160) -> Exc
     if n == 0:
         return Exceedance(*[np.array([])] * 4)
     # Even in rank, and every one of the upper tail, which the logarithmic axis spreads out.
-    index = np.unique(np.r_[np.linspace(0, n - 1, min(n, points)).round().astype(int),
-                            np.arange(max(0, n - 25), n)])
+    index = np.unique(
+        np.r_[
+            np.linspace(0, n - 1, min(n, points)).round().astype(int), np.arange(max(0, n - 25), n)
+        ]
+    )
     shares = [probability_above(x, x[k], confidence) for k in index]
-    return Exceedance(x[index], np.array([s.value for s in shares]),
-                      np.array([s.low for s in shares]), np.array([s.high for s in shares]))
+    return Exceedance(
+        x[index],
+        np.array([s.value for s in shares]),
+        np.array([s.low for s in shares]),
+        np.array([s.high for s in shares]),
+    )
 
 
 def _t_factor(n, confidence: float):

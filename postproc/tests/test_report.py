@@ -1,0 +1,140 @@
+"""The report on whole, running, failed and empty ensembles."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from synthetic import sample, write_ensemble
+
+from sgimp_post.cli import main
+
+HOMOGENEOUS = {"label": "deterministic", "values": sample(1, 8, 5.6, 0.05)}
+
+
+def study(count):
+    """Five functions and three coefficients of variation."""
+    return [
+        {"label": f"{acf}_cov{cov:.2f}", "acf": acf, "cov": cov, "values": sample(k, count)}
+        for k, (acf, cov) in enumerate(
+            (acf, cov) for acf in ("snx", "sqx", "smk", "csx", "bin") for cov in (0.05, 0.1, 0.15)
+        )
+    ]
+
+
+def base(count, **more):
+    """One case without a study."""
+    return {"label": "base", "acf": "snx", "cov": 0.1, "values": sample(9, count), **more}
+
+
+ENSEMBLES = {
+    "one case": ([HOMOGENEOUS, base(50)], "complete"),
+    "deterministic only": ([HOMOGENEOUS], "complete"),
+    "one member": ([{**HOMOGENEOUS, "values": [5.6]}], "complete"),
+    "study": ([HOMOGENEOUS, *study(12)], "complete"),
+    "empty": ([{**HOMOGENEOUS, "values": []}, base(0, planned=10)], "running"),
+    "one row": ([HOMOGENEOUS, base(1, planned=10)], "running"),
+    "two rows": ([HOMOGENEOUS, base(2, planned=10)], "running"),
+    "partial": ([HOMOGENEOUS, base(6, ids=[1, 2, 3, 5, 8, 9], planned=10)], "stopped"),
+    "all failed": ([HOMOGENEOUS, base(4, failed=[1, 2, 3, 4])], "complete"),
+}
+
+
+def report(directory, capsys):
+    """Runs the command; returns the HTML and the numbers."""
+    assert main(["report", str(directory)]) == 0
+    path = capsys.readouterr().out.strip()
+    assert path == str(directory / "report" / "report.html")
+    html = (directory / "report" / "report.html").read_text()
+    return html, json.loads((directory / "report" / "report.json").read_text())
+
+
+@pytest.mark.parametrize("name", ENSEMBLES)
+def test_every_kind_of_ensemble_gives_a_sound_page(name, tmp_path, capsys):
+    cases, state = ENSEMBLES[name]
+    write_ensemble(tmp_path, cases, state, snapshots=[("deterministic", 1)])
+    html, _ = report(tmp_path, capsys)
+    assert len(html) < 5_000_000
+    assert not re.search(r"(src|href)=\"(https?:)?//", html) and "<script" not in html
+    for target in re.findall(r'href="#([^"]+)"', html):
+        assert f'id="{target}"' in html
+    for target in re.findall(r'href="([^"#]+)"', html):
+        assert (tmp_path / "report" / target).is_file()
+    assert "nan" not in re.sub(r"data:[^\"]+", "", html).lower().replace("provenance", "")
+
+
+def test_numbers_are_those_of_the_sample(tmp_path, capsys):
+    case = base(50)
+    write_ensemble(tmp_path, [HOMOGENEOUS, case])
+    html, numbers = report(tmp_path, capsys)
+    got = numbers["cases"][0]
+    values = case["values"]
+    assert got["runouts"]["runout_max"]["mean"] == pytest.approx(values.mean(), rel=1e-12)
+    assert got["runouts"]["runout_q995"]["sd"] == pytest.approx(0.9 * values.std(ddof=1), rel=1e-12)
+    above = np.mean(values > np.mean(HOMOGENEOUS["values"]))
+    assert got["exceedance"]["value"] == pytest.approx(above)
+    assert f"mean {values.mean():.3f} m" in html
+
+
+def test_a_stopped_run_counts_no_member_behind_a_gap(tmp_path, capsys):
+    cases, state = ENSEMBLES["partial"]
+    write_ensemble(tmp_path, cases, state)
+    html, numbers = report(tmp_path, capsys)
+    assert numbers["cases"][0]["runouts"]["runout_max"]["n"] == 3
+    assert "without a gap" in html
+
+
+def test_failed_members_are_listed_with_their_reason(tmp_path, capsys):
+    write_ensemble(tmp_path, [HOMOGENEOUS, base(9, failed=[4])])
+    html, numbers = report(tmp_path, capsys)
+    assert (
+        numbers["totals"]["failed"] == 1 and numbers["cases"][0]["runouts"]["runout_max"]["n"] == 8
+    )
+    assert "point left the grid" in html and "point lost" in html
+
+
+def test_pairs_use_the_same_realizations(tmp_path, capsys):
+    first = {**base(20), "label": "snx_cov0.10"}
+    second = {**first, "label": "sqx_cov0.10", "acf": "sqx", "values": first["values"] - 0.25}
+    write_ensemble(tmp_path, [HOMOGENEOUS, first, second])
+    _, numbers = report(tmp_path, capsys)
+    pair = numbers["pairs"][0]
+    assert pair["mean"] == pytest.approx(0.25) and pair["high"] - pair["low"] < 1e-6
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no HDF5"])
+def test_bad_input_is_one_line_and_exit_code_2(content, tmp_path, capsys):
+    if content is not None:
+        (tmp_path / "ensemble.h5").write_bytes(content)
+    assert main(["report", str(tmp_path)]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith("sgimp-post: ") and message.count("\n") == 1
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium")
+def test_a_browser_renders_the_page(tmp_path, capsys):
+    write_ensemble(tmp_path, [HOMOGENEOUS, base(50)])
+    report(tmp_path, capsys)
+    dump = subprocess.run(
+        [
+            "chromium",
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--dump-dom",
+            f"file://{tmp_path / 'report' / 'report.html'}",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    ).stdout
+    assert "58 members ok" in dump
