@@ -1,4 +1,4 @@
-"""Every number of the report, computed once, as plain dictionaries that go to HTML, CSV and JSON."""
+"""Every number of the report, computed once: plain dictionaries for HTML, CSV and JSON."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _case(case, primary: str, floor: dict) -> dict:
 
 
 def _pairs(cases: list, primary: str) -> list:
-    """Differences between cases that share their random numbers and their coefficient of variation."""
+    """Differences between cases that share random numbers and coefficient of variation."""
     rows = []
     for first, second in combinations(cases, 2):
         if first.cov != second.cov or len(rows) >= MOST_PAIRS:

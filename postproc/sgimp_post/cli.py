@@ -27,7 +27,7 @@ def main(arguments=None) -> int:
         "--runout",
         choices=list(RUNOUTS),
         default="runout_max",
-        help="definition that figures and fits use (default runout_max, the paper's); tables have all",
+        help="definition that figures and fits use (default runout_max, as the paper)",
     )
     options = parser.parse_args(arguments)
     from .report import write_report  # matplotlib takes a second; --help should not

@@ -271,8 +271,8 @@ def profile_figure(cases, geometry):
 
 @styled
 def configuration_figure(snapshot, geometry):
-    """Initial field and final deposit, coloured by friction angle: red strong, blue weak, as in Figs. 8 and 9
-    of the paper."""
+    """Initial field and final deposit, coloured by friction angle: red strong, blue weak
+    (Figs. 8 and 9 of the paper)."""
     states = [state for state in (snapshot.initial, snapshot.final) if state is not None]
     if not states:
         return None

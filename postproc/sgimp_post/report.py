@@ -24,7 +24,7 @@ MOST_CASES = 15
 
 
 def write_report(directory: Path, output: Path | None = None, primary: str = "runout_max") -> Path:
-    """Reads DIR/ensemble.h5 and DIR/snapshots and writes the report; returns the path of the HTML."""
+    """Reads DIR and writes the report of it; returns the path of the HTML."""
     ensemble = read_ensemble(directory)
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
@@ -82,7 +82,8 @@ def verdict(summary: dict) -> list:
     cost = summary["cost"]
     if cost["seconds"]["n"]:
         lines.append(
-            f"Cost: {cost['seconds']['mean']:.2f} s a member, {cost['core_hours']:.3g} core-hours in all."
+            f"Cost: {cost['seconds']['mean']:.2f} s a member,"
+            f" {cost['core_hours']:.3g} core-hours in all."
         )
     return lines
 
@@ -93,7 +94,8 @@ def _case_sentence(case: dict, summary: dict) -> str:
         return f"{case['label']}: no member has ended well yet."
     text = f"{case['label']}: mean {runout['mean']:.3f} m"
     if runout["n"] > 1:
-        text += f" (95 %: {runout['mean_low']:.3f} to {runout['mean_high']:.3f}), sd {runout['sd']:.3f} m"
+        text += f" (95 %: {runout['mean_low']:.3f} to {runout['mean_high']:.3f})"
+        text += f", sd {runout['sd']:.3f} m"
     if share["n"]:
         text += (
             f"; {100 * share['value']:.0f} % run farther than homogeneous ground"
@@ -113,7 +115,8 @@ def _study_sentence(summary: dict) -> str:
         return "No heterogeneous member has ended well yet."
     means = [case["runouts"][name]["mean"] for case in rows]
     shares = [case["exceedance"]["value"] for case in rows if case["exceedance"]["n"]]
-    text = f"Heterogeneous ground, {len(rows)} cases: means from {min(means):.3f} m to {max(means):.3f} m"
+    text = f"Heterogeneous ground, {len(rows)} cases:"
+    text += f" means from {min(means):.3f} m to {max(means):.3f} m"
     if shares:
         text += (
             f"; between {100 * min(shares):.0f} % and {100 * max(shares):.0f} % of the members run"
@@ -127,12 +130,14 @@ def warnings(summary: dict) -> list:
     totals, found = summary["totals"], []
     if not summary["complete"]:
         found.append(
-            f"The run is {summary['state']}: statistics use the {totals['used']} members without a gap"
+            f"The run is {summary['state']}: statistics use the {totals['used']} members without a"
+            " gap"
             f" from the first on, of {totals['done']} done."
         )
     if totals["unsettled"]:
         found.append(
-            f"{totals['unsettled']} members were still moving at end_time; their runout is a lower bound."
+            f"{totals['unsettled']} members were still moving at end_time;"
+            " their runout is a lower bound."
         )
     if totals["wall_touched"]:
         found.append(
@@ -156,7 +161,7 @@ def warnings(summary: dict) -> list:
 
 
 def _figures(ensemble, summary: dict) -> dict:
-    """Data URIs by the names that the template knows; None or empty where there is nothing to draw."""
+    """Data URIs by the names of the template; None or empty where there is nothing to draw."""
     name = summary["primary"]
     floor = summary["deterministic"][name]
     cases = [case for case in ensemble.for_statistics() if not case.is_homogeneous]

@@ -9,8 +9,8 @@ COLUMNS_X = 40
 
 
 def write_ensemble(directory, cases, state="complete", snapshots=()):
-    """`cases`: dictionaries with label, values (farthest point, m) and, if wanted, ids, failed (ids), planned,
-    acf, cov; the first may be the homogeneous one."""
+    """`cases`: dictionaries with label, values (farthest point, m) and, if wanted, ids,
+    failed (ids), planned, acf, cov; the first may be the homogeneous one."""
     directory.mkdir(parents=True, exist_ok=True)
     with h5py.File(directory / "ensemble.h5", "w") as file:
         file.attrs.update(

@@ -49,8 +49,8 @@ def test_bic_less_aic_is_two_ln_n_less_four():
 
 
 def test_gumbel_estimates_scatter_as_theory_says():
-    """n var(location)/beta^2 = 1.108665 and n var(beta)/beta^2 = 0.607927; 150 samples of 200 give each to 12 %
-    (one standard error of a variance, sqrt(2/150)), so 40 % is beyond three."""
+    """n var(location)/beta^2 = 1.108665 and n var(beta)/beta^2 = 0.607927; 150 samples of 200 give
+    each to 12 % (one standard error of a variance, sqrt(2/150)), so 40 % is beyond three."""
     rng = np.random.default_rng(3)
     got = [by_law(rng.gumbel(5.0, 0.5, 200))["gumbel"].parameters for _ in range(150)]
     location = 200 * np.var([one["location"] for one in got]) / 0.25

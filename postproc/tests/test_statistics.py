@@ -20,7 +20,7 @@ def test_standard_deviation_factors(n, low, high):
 
 
 def test_intervals_cover_what_they_promise():
-    """Of 1000 ensembles of 50, a 95 % interval misses 50 +- 7; 93 to 97 % is three standard errors."""
+    """Of 1000 ensembles of 50, a 95 % interval misses 50 +- 7: 93 to 97 % is three sigma."""
     rng = np.random.default_rng(5)
     mean = proportion = 0
     for _ in range(1000):

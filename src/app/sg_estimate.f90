@@ -48,15 +48,19 @@ contains
     members = plan%total()
     megabytes = real(members, wp)*(8.0_wp*COLUMN_COUNT + 4.0_wp*cells_x + 32.0_wp)*2.0_wp*1.0e-6_wp
     text = 'case            '//trim(config%name)//line( &
-      'points          '//to_text(scene%particles%count)//' in '//to_text(size(config%bodies))//' bodies')//line( &
-      'cells           '//to_text(cells_x)//' x '//to_text(cells_y)//' of '//to_text(config%grid%cell_size)//' m')//line( &
+      'points          '//to_text(scene%particles%count)//' in '//to_text(size(config%bodies))// &
+      ' bodies')//line( &
+      'cells           '//to_text(cells_x)//' x '//to_text(cells_y)//' of '// &
+      to_text(config%grid%cell_size)//' m')//line( &
       'time step       '//to_text(scene%first_step, &
       4)//' s at the start; limit h/(c + v) = '//to_text(limit, 4)// &
       ' s, wave speed '//to_text(scene%wave_speed, 4)//' m/s')//line( &
-      'steps           '//to_text(steps_needed)//' or more to end_time = '//to_text(config%solver%end_time)// &
+      'steps           '//to_text(steps_needed)//' or more to end_time = '// &
+      to_text(config%solver%end_time)// &
       ' s, fewer if it comes to rest')//line( &
       'random field    '//field)//line( &
-      'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '//case_list(plan))//line( &
+      'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '// &
+      case_list(plan))//line( &
       'one member      about '//text_of_duration(member_seconds)//' ('// &
       to_text(1.0e9_wp*step_seconds/scene%particles%count, &
       3)//' ns per point and step here and now)')//line( &

@@ -127,7 +127,8 @@ contains
     if (.not. allocated(error)) call say(comm, text)
   end subroutine say_estimate
 
-  !> On standard error. Faults of a case file begin with its name, as compilers have it; others with the program's.
+  !> On standard error. Faults of a case file begin with its name, as compilers have it; others with
+  !> the program's.
   subroutine complain(case_file, message)
     character(len=*), intent(in) :: case_file, message
 

@@ -10,6 +10,7 @@ module sg_sorting
   interface
     subroutine gsl_sort_index(order, values, stride, count) bind(c, name='gsl_sort_index')
       import :: c_double, c_size_t
+      implicit none
       integer(c_size_t), intent(out) :: order(*)
       real(c_double), intent(in) :: values(*)
       integer(c_size_t), value :: stride, count

@@ -84,7 +84,6 @@ contains
     real(wp) :: x1, y1, x2, y2
     integer :: k, corners
 
-    inside = .true.
     select case (body%shape)
     case ('disc')
       inside = (x - body%x)**2 + (y - body%y)**2 <= body%radius**2
@@ -99,6 +98,8 @@ contains
         if ((y1 > y) .eqv. (y2 > y)) cycle
         if (x < x1 + (y - y1)/(y2 - y1)*(x2 - x1)) inside = .not. inside
       end do
+    case default ! a rectangle is its own box
+      inside = .true.
     end select
   end function is_inside
 end module sg_bodies

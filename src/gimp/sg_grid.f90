@@ -16,9 +16,9 @@ module sg_grid
 
   !> Layers of nodes outside each wall.
   integer, parameter :: GHOST = 2
-  !> Share of the smallest point mass below which a node counts as empty. Momentum over mass is accurate however
-  !> small both are; a weight S below this means that the point reaches the node by less than the rounding of its
-  !> position.
+  !> Share of the smallest point mass below which a node counts as empty. Momentum over mass is
+  !> accurate however small both are; a weight S below this means that the point reaches the node by
+  !> less than the rounding of its position.
   real(wp), parameter :: EMPTY_NODE = 1.0e-30_wp
 
   integer, parameter :: WALL_FREE = 0

@@ -34,6 +34,7 @@ module sg_observer
   abstract interface
     subroutine note_history_interface(this, row)
       import :: observer_t, history_row_t
+      implicit none
       class(observer_t), intent(inout) :: this
       type(history_row_t), intent(in) :: row
     end subroutine note_history_interface
@@ -41,6 +42,7 @@ module sg_observer
     !> The points at the end of step `step`, at `time` seconds.
     subroutine note_state_interface(this, step, time, particles)
       import :: observer_t, particles_t, wp
+      implicit none
       class(observer_t), intent(inout) :: this
       integer, intent(in) :: step
       real(wp), intent(in) :: time

@@ -1,7 +1,7 @@
 !> What is measured on a state of the points: runout by four definitions, heights, profile,
 !> energies.
-!> Runouts are measured from the initial toe of the measured bodies, in m, towards +x: those of the material that
-!> the random field varies, all bodies where there is none.
+!> Runouts are measured from the initial toe of the measured bodies, in m, towards +x: those of the
+!> material that the random field varies, all bodies where there is none.
 module sg_runout
   use sg_kinds, only: sp, wp
   use sg_materials, only: material_t

@@ -17,7 +17,8 @@ module sg_scene
     type(material_t), allocatable :: materials(:)
     !> Points at their first place with their first velocity and the stress of the ground, if any.
     type(particles_t) :: particles
-    !> Position of the toe that runouts are measured from: the right end of the measured bodies, in m.
+    !> Position of the toe that runouts are measured from: the right end of the measured bodies, in
+    !> m.
     real(wp) :: toe
     !> Extent of the measured bodies in m: x_min, x_max, y_min, y_max.
     real(wp) :: extent(4)

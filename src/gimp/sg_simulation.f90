@@ -5,9 +5,13 @@ module sg_simulation
   use sg_config, only: config_t
   use sg_kinds, only: sp, wp
   use sg_initial_stress, only: make_admissible
-  use sg_monitor, only: ABANDON, GO_ON, monitor_t, OUT_OF_TIME
+  use sg_monitor, only: ABANDON, monitor_t, OUT_OF_TIME
   use sg_observer, only: history_row_t, observer_t
-  use sg_outcome
+  use sg_outcome, only: ENERGY_ERROR, FAILURE_POINT, FAILURE_STEP, FAILURE_X, FAILURE_Y, &
+    FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
+    KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
+    RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_NOT_FINITE, STATUS_OK, &
+    STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
   use sg_particles, only: copy_particles
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, &
@@ -192,7 +196,7 @@ contains
     associate (t => solver%tally, s => solver%particles)
       if (.not. abs(t%kinetic_energy) <= huge(1.0_wp) &
         .or. .not. abs(t%internal_work) <= huge(1.0_wp)) then
-        p = minloc(merge(0, 1, .not. abs(s%vx + s%vy + s%sxx + s%syy + s%szz &
+        p = minloc(merge(1, 0, abs(s%vx + s%vy + s%sxx + s%syy + s%szz &
           + s%sxy) <= huge(1.0_wp)), dim=1)
         call fail(STATUS_NOT_FINITE, p, &
           'velocity or stress is not a finite number: the time step is too long or '// &
@@ -251,8 +255,6 @@ contains
     type(outcome_t), intent(inout) :: outcome
 
     select case (monitor%ask())
-    case (GO_ON)
-      return
     case (ABANDON)
       outcome%status = STATUS_ABANDONED
     case (OUT_OF_TIME)
@@ -260,6 +262,7 @@ contains
       outcome%reason = 'wall clock limit of a member reached at '//to_text(clock%time, &
         4)//' s of simulated time'
       outcome%values(FAILURE_STEP) = clock%step
+    case default ! GO_ON
     end select
   end subroutine ask_monitor
 

@@ -146,7 +146,7 @@ contains
       call this%sweep_points(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
         map_force=.true.), &
                              time_step)
-    case (SCHEME_USF)
+    case default ! SCHEME_USF
       call this%grid%find_velocity()
       call this%sweep_points(sweep_t(update_stress=.true., map_force=.true.), time_step)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, damping_work)

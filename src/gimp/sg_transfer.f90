@@ -10,9 +10,9 @@
 !> map_force:      f_i -= V_p sigma_p grad S                                  (Eq. 5)
 !> gather:         a_p = sum S motion_i;  L_p = sum motion_i(3:4) (x) grad S
 !>
-!> Nodes are counted along rows: node (i, j) is i + j (nx + 1). What a point brings to the nodes is laid
-!> out for the whole block first: vectors put together from numbers just computed would stall the
-!> loads behind them.
+!> Nodes are counted along rows: node (i, j) is i + j (nx + 1). What a point brings to the nodes is
+!> laid out for the whole block first: vectors put together from numbers just computed would stall
+!> the loads behind them.
 module sg_transfer
   use sg_kinds, only: wp
   use sg_weighting, only: BLOCK, weights_t
@@ -181,8 +181,8 @@ contains
     end do
   end subroutine gather_motion
 
-  !> As gather_motion; also gradient(:, p) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy) of v = motion(3:4),
-  !> in 1/s.
+  !> As gather_motion; also gradient(:, p) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy) of v =
+  !> motion(3:4), in 1/s.
   pure subroutine gather_motion_and_gradient(n, w, nx, ny, motion, value, gradient)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w

@@ -37,6 +37,7 @@ module sg_weighting
     !> grid is held inside, so that no array is overrun before the end of the step reports it lost.
     pure subroutine axis_weights_interface(n, x, origin, inverse_cell, width, last_base, base, s, g)
       import :: wp, BLOCK
+      implicit none
       integer, intent(in) :: n
       !> Positions in m.
       real(wp), intent(in) :: x(n)

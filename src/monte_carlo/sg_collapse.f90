@@ -75,7 +75,8 @@ contains
     end do
   end subroutine init_collapse
 
-  !> How the fields are sampled, with the jitter of each factor that needed one; empty without a field.
+  !> How the fields are sampled, with the jitter of each factor that needed one; empty without a
+  !> field.
   function field_method(this) result(text)
     class(collapse_model_t), intent(in) :: this
     character(len=:), allocatable :: text

@@ -113,8 +113,9 @@ contains
       if (decision /= CARRY_ON) this%stop_reason = 'the wall clock limit'
     end if
     if (now - this%last_report >= this%report_seconds) call this%report()
-    if (now - this%last_write >= max(this%report_seconds, this%write_cost/WRITE_SHARE)) &
+    if (now - this%last_write >= max(this%report_seconds, this%write_cost/WRITE_SHARE)) then
       call this%write_results(this%error)
+    end if
   end function decide
 
   !> A line of progress.

@@ -75,8 +75,9 @@ contains
 
     exit_code = EXIT_OK
     call catch_signals(error)
-    if (.not. allocated(error) .and. comm%rank() == 0) &
+    if (.not. allocated(error) .and. comm%rank() == 0) then
       call prepare(request, comm%size(), director, error)
+    end if
     call comm%agree(error)
     if (.not. allocated(error)) then
       allocate (tasks(2, 0))
@@ -261,8 +262,9 @@ contains
     logical :: missing
 
     missing = .true.
-    if (director%plan%holds(damage%case_index, damage%id)) &
+    if (director%plan%holds(damage%case_index, damage%id)) then
       missing = .not. director%results(damage%case_index)%present(damage%id)
+    end if
   end function is_missing
 
   pure function damaged_name(director, damage) result(text)

@@ -109,7 +109,8 @@ contains
     signature_found = transfer(bytes(:8), signature_found)
     numbers = transfer(bytes(9:HEADER), numbers)
     if (signature_found /= SIGNATURE .or. numbers(2) /= BYTE_ORDER) then
-      call raise(error, EXIT_BAD_INPUT, JOURNAL_NAME//' is no journal of this program on such a '// &
+      call raise(error, EXIT_BAD_INPUT, JOURNAL_NAME// &
+        ' is no journal of this program on such a '// &
         'machine; --overwrite starts anew', 'journal_t%load')
     else if (numbers(1) /= FORMAT_VERSION .or. numbers(3) /= COLUMN_COUNT) then
       call raise(error, EXIT_BAD_INPUT, JOURNAL_NAME//' is of another version of the program; '// &

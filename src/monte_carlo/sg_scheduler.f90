@@ -257,6 +257,7 @@ contains
     case (DONE)
       call this%tell(source, BYE)
       this%is_open(source) = .false.
+    case default ! no other tag is sent to rank 0
     end select
   end subroutine handle
 
@@ -319,6 +320,7 @@ contains
       case (BYE)
         this%dismissed = .true.
         exit
+      case default ! no other tag is sent to a worker
       end select
     end do
     if (this%said) return

@@ -78,7 +78,8 @@ contains
     open (newunit=unit, file=path, position='append', action='write', iostat=status)
     if (status /= 0) return
     write (unit, '(a)', iostat=status) text
-    close (unit, iostat=status)
+    if (status == 0) flush (unit, iostat=status)
+    if (status == 0) close (unit)
   end subroutine add_line
 
   !> Ids that are marked, like `17-23,31`.

@@ -139,6 +139,7 @@ contains
                                           p%syy(first:last), &
                                           p%sxy(first:last), g%nx, g%ny, &
                                           g%total_store(g%total_start))
+            case default ! the nodes: below, once for all points
             end select
           end associate
         end do
