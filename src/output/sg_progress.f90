@@ -73,13 +73,13 @@ contains
   !> looked at.
   subroutine add_line(path, text)
     character(len=*), intent(in) :: path, text
-    integer :: unit, status
+    integer :: unit, status, written
 
     open (newunit=unit, file=path, position='append', action='write', iostat=status)
     if (status /= 0) return
-    write (unit, '(a)', iostat=status) text
-    if (status == 0) flush (unit, iostat=status)
-    if (status == 0) close (unit)
+    write (unit, '(a)', iostat=written) text
+    close (unit, iostat=status)
+    if (max(written, status) > 0) return ! the line is lost, no result
   end subroutine add_line
 
   !> Ids that are marked, like `17-23,31`.
