@@ -119,8 +119,7 @@ contains
     real(wp), intent(in) :: coordinates(:)
     real(wp), intent(out) :: spacing
     integer, allocatable, intent(out) :: place(:)
-    real(wp), allocatable :: steps(:)
-    real(wp) :: extent
+    real(wp) :: steps(size(coordinates)), extent
     integer :: n
 
     n = size(coordinates)

@@ -1,5 +1,6 @@
 !> Statistics of a running ensemble.
 module sg_statistics
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use sg_kinds, only: i8, wp
   use sg_special_functions, only: student_quantile
   implicit none
@@ -25,7 +26,7 @@ contains
     type(sample_statistics_t) :: statistics
     logical :: good(size(values))
 
-    good = wanted .and. abs(values) <= huge(1.0_wp)
+    good = wanted .and. ieee_is_finite(values)
     associate (n => statistics%count)
       n = count(good, kind=i8)
       if (n == 0) return
