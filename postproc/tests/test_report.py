@@ -134,7 +134,7 @@ def test_a_browser_renders_the_page(tmp_path, capsys):
         ],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=180,
         check=True,
     ).stdout
     assert "58 members ok" in dump
