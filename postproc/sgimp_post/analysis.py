@@ -9,10 +9,21 @@ import numpy as np
 
 from .ensemble import RUNOUTS, STATUS_TEXTS
 from .fits import best_fit, fit_laws, rivals
-from .statistics import describe, holm, paired_difference, probability_above, wilson
+from .statistics import (
+    describe,
+    finite,
+    holm,
+    outlier_probability,
+    paired_difference,
+    probability_above,
+    wilson,
+)
 
 #: Largest number of pairs that is listed.
 MOST_PAIRS = 45
+#: The nominal run is an outlier when its prediction t statistic, judged by the other homogeneous
+#: runs, is beyond this two-sided probability.
+OUTLIER = 0.001
 
 
 def analyse(ensemble, primary: str) -> dict:
@@ -28,20 +39,26 @@ def analyse(ensemble, primary: str) -> dict:
         "totals": _totals(ensemble),
         "deterministic": floor,
         "cases": [_case(case, primary, floor) for case in studied],
-        "pairs": _pairs(studied, primary),
+        "pairs": _pairs(studied, primary, floor[primary]["sd"]),
         "failures": _failures(ensemble),
         "cost": _cost(ensemble),
     }
 
 
 def _noise_floor(case, name: str) -> dict:
-    """Nominal run, mean and spread of the homogeneous members for one runout, in m."""
-    if case is None or case.count == 0:
-        return {"nominal": np.nan, **asdict(describe([]))}
-    nominal = case.column(name)[(case.id == 1) & case.ok]
+    """Mean and spread of the homogeneous members for one runout, in m; beside them the nominal run
+    and the others without it, since one far run of eight decides what the noise floor is."""
+    values = np.array([]) if case is None else case.values(name)
+    others, nominal = np.array([]), np.nan
+    if case is not None:
+        others = finite(case.column(name)[(case.id != 1) & case.ok])
+        first = finite(case.column(name)[(case.id == 1) & case.ok])
+        nominal = float(first[0]) if len(first) else np.nan
     return {
-        "nominal": float(nominal[0]) if len(nominal) else np.nan,
-        **asdict(describe(case.values(name))),
+        "nominal": nominal,
+        "nominal_is_outlier": bool(outlier_probability(nominal, others) < OUTLIER),
+        "others": asdict(describe(others)),
+        **asdict(describe(values)),
     }
 
 
@@ -98,7 +115,7 @@ def _case(case, primary: str, floor: dict) -> dict:
     }
 
 
-def _pairs(cases: list, primary: str) -> list:
+def _pairs(cases: list, primary: str, noise: float) -> list:
     """Differences between cases that share random numbers and coefficient of variation."""
     rows = []
     for first, second in combinations(cases, 2):
@@ -109,7 +126,15 @@ def _pairs(cases: list, primary: str) -> list:
         difference = paired_difference(
             first.column(primary)[one][good], second.column(primary)[two][good]
         )
-        rows.append({"first": first.label, "second": second.label, **asdict(difference)})
+        below = bool(abs(difference.mean) < noise)  # False where either is not known
+        rows.append(
+            {
+                "first": first.label,
+                "second": second.label,
+                "below_noise": below,
+                **asdict(difference),
+            }
+        )
     for row, adjusted in zip(rows, holm([row["p_value"] for row in rows])):
         row["p_adjusted"] = float(adjusted)
     return rows

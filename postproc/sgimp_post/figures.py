@@ -16,6 +16,9 @@ from .ensemble import RUNOUTS
 from .fits import LAWS, distribution_of, fit_laws
 from .statistics import describe, exceedance, running
 
+#: Values up to which each one has its tick below the histogram; a tick takes 230 bytes of SVG.
+MOST_TICKS = 200
+
 #: Okabe and Ito's palette, told apart by colour-blind readers.
 ACF_COLOURS = {
     "snx": "#D55E00",
@@ -111,7 +114,8 @@ def _histogram(axis, values, tint, deterministic):
         return
     bins = "fd" if len(values) >= 30 and np.ptp(values) > 0 else max(3, min(10, len(values) // 2))
     axis.hist(values, bins=bins, density=True, color=tint, alpha=0.30, edgecolor="white")
-    axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
+    if len(values) <= MOST_TICKS:
+        axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
     margin = 0.25 * max(np.ptp(values), 1e-3)
     x = np.linspace(values.min() - margin, values.max() + margin, 300)
     for fit in fit_laws(values):
@@ -276,13 +280,15 @@ def configuration_figure(snapshot, geometry):
     states = [state for state in (snapshot.initial, snapshot.final) if state is not None]
     if not states:
         return None
-    right = max(state.position[:, 0].max() for state in states)
+    left, bottom = np.min([state.position.min(axis=0) for state in states], axis=0)
     top = max(state.position[:, 1].max() for state in states)
-    widths = [state.position[:, 0].max() for state in states]
+    spacing = geometry.point_spacing or (top - bottom) / 80
+    widths = [state.position[:, 0].max() - left + spacing for state in states]
+    height = top - bottom + spacing
     figure, axes = plt.subplots(
         1,
         len(states),
-        figsize=(11.5, 1.15 + 9.6 * top / sum(widths)),
+        figsize=(11.5, 1.15 + 9.6 * height / sum(widths)),
         squeeze=False,
         gridspec_kw={"width_ratios": widths},
     )
@@ -292,7 +298,6 @@ def configuration_figure(snapshot, geometry):
     # Homogeneous ground (to within the jitter of its strength) has one colour and no bar.
     is_uniform = len(angles) == 0 or float(np.ptp(angles)) < 1e-2
     spread = 3.0 * float(np.std(angles)) if not is_uniform else 1.0
-    spacing = geometry.point_spacing or right / 150
     for axis, state, width in zip(axes[0], states, widths):
         points = 11.5 * 72 * 0.84 / sum(widths) * spacing
         tint = (
@@ -310,8 +315,8 @@ def configuration_figure(snapshot, geometry):
             *state.position.T, s=max(points**2 * 0.9, 0.3), marker="s", lw=0, **tint
         )
         axis.set_aspect("equal")
-        axis.set_xlim(-0.02 * width, 1.02 * width)
-        axis.set_ylim(-0.01 * top, 1.02 * top)
+        axis.set_xlim(left - 0.02 * width, left + 1.02 * width)
+        axis.set_ylim(bottom - 0.01 * height, bottom + 1.02 * height)
         axis.grid(False)
         axis.set_xlabel("x [m]")
         axis.set_title(f"t = {state.time:.2f} s")

@@ -17,7 +17,8 @@ from .errors import PostError
 from .fits import LAWS
 from .snapshots import find_snapshots, read_snapshot
 
-#: Snapshots that are shown: the first of each case, at most so many.
+#: Snapshots that are shown: the first of each case, at most so many; homogeneous ground first, then
+#: one of each autocorrelation function before a second one of any.
 MOST_CONFIGURATIONS = 6
 #: Cases whose own figure is shown.
 MOST_CASES = 15
@@ -143,6 +144,14 @@ def warnings(summary: dict) -> list:
         found.append(
             f"{totals['wall_touched']} members touched a wall; it may have cut their runout short."
         )
+    floor = summary["deterministic"][summary["primary"]]
+    if floor["nominal_is_outlier"]:
+        found.append(
+            f"The nominal homogeneous run ({floor['nominal']:.3f} m) lies far outside the other"
+            f" {floor['others']['n']} ({floor['others']['mean']:.3f} ± {floor['others']['sd']:.3f}"
+            f" m). It alone makes up most of the noise floor of {floor['sd']:.3f} m: more"
+            " homogeneous members (noise_members) are needed before a spread is called noise."
+        )
     inside = [case["label"] for case in summary["cases"] if case["shift_below_noise"]]
     if inside:
         found.append(
@@ -150,13 +159,24 @@ def warnings(summary: dict) -> list:
             + ", ".join(inside)
             + ". Such a difference is not a finding."
         )
-    noisy = [case["label"] for case in summary["cases"] if case["noise_share"] > 0.5]
-    if noisy:
+    pairs = [pair for pair in summary["pairs"] if pair["n"]]
+    if pairs and all(pair["below_noise"] for pair in pairs):
         found.append(
-            "More than half of the variance of the runout is discretisation noise in: "
-            + ", ".join(noisy)
-            + "."
+            "All paired differences between autocorrelation functions are smaller than the noise"
+            f" floor (largest {max(abs(pair['mean']) for pair in pairs):.3f} m against"
+            f" {floor['sd']:.3f} m)."
         )
+    noisy = [case for case in summary["cases"] if case["noise_share"] > 0.5]
+    if noisy:
+        line = (
+            "More than half of the variance of the runout is discretisation noise in: "
+            + ", ".join(case["label"] for case in noisy)
+        )
+        if floor["nominal_is_outlier"]:
+            spreads = [case["runouts"][summary["primary"]]["sd"] for case in noisy]
+            share = 100.0 * (floor["others"]["sd"] / min(spreads)) ** 2
+            line += f". Without the nominal homogeneous run it is at most {share:.0f} %"
+        found.append(line + ".")
     return found
 
 
@@ -188,7 +208,12 @@ def _figures(ensemble, summary: dict) -> dict:
 
 def _configurations(ensemble) -> list:
     shown, labels = [], set()
-    for label, member, path in find_snapshots(ensemble.directory):
+    rank, seen = {}, {}
+    for order, case in enumerate(ensemble.cases):
+        seen[case.acf] = seen.get(case.acf, 0) + 1
+        rank[case.label] = (seen[case.acf], order)
+    found = [entry for entry in find_snapshots(ensemble.directory) if entry[0] in rank]
+    for label, member, path in sorted(found, key=lambda entry: rank[entry[0]]):
         if label in labels or len(shown) >= MOST_CONFIGURATIONS:
             continue
         snapshot = read_snapshot(label, member, path)

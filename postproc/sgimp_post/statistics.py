@@ -138,6 +138,16 @@ def paired_difference(first, second, confidence: float = CONFIDENCE) -> Differen
     return Difference(n, mean, mean - half, mean + half, p_value)
 
 
+def outlier_probability(value: float, others) -> float:
+    """Two-sided probability that one more value of the normal population of `others` lies as far
+    from their mean as `value` (t statistic of a prediction); 1 where that cannot be judged."""
+    x = finite(others)
+    if len(x) < 3 or not np.isfinite(value) or np.ptp(x) == 0.0:
+        return 1.0
+    error = float(np.std(x, ddof=1)) * np.sqrt(1.0 + 1.0 / len(x))
+    return float(2.0 * stats.t.sf(abs(value - x.mean()) / error, len(x) - 1))
+
+
 def welch_difference(first, second, confidence: float = CONFIDENCE) -> Difference:
     """Difference of the means of two independent samples of unequal variance."""
     a, b = finite(first), finite(second)

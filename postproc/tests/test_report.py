@@ -10,6 +10,9 @@ import pytest
 from synthetic import sample, write_ensemble
 
 from sgimp_post.cli import main
+from sgimp_post.ensemble import Geometry
+from sgimp_post.figures import configuration_figure
+from sgimp_post.snapshots import Snapshot, State
 
 HOMOGENEOUS = {"label": "deterministic", "values": sample(1, 8, 5.6, 0.05)}
 
@@ -102,6 +105,58 @@ def test_pairs_use_the_same_realizations(tmp_path, capsys):
     _, numbers = report(tmp_path, capsys)
     pair = numbers["pairs"][0]
     assert pair["mean"] == pytest.approx(0.25) and pair["high"] - pair["low"] < 1e-6
+
+
+def test_a_full_study_stays_within_five_megabytes(tmp_path, capsys):
+    """15 cases of 1000; pictures of points, six at most, add up to 0.2 MB each."""
+    cases = study(1000)
+    snapshots = [(case["label"], 1) for case in cases]
+    write_ensemble(tmp_path, [HOMOGENEOUS, *cases], snapshots=snapshots)
+    html, _ = report(tmp_path, capsys)
+    assert len(html) < 5_000_000 - 6 * 160_000
+    assert set(re.findall(r"alt=\"Field and deposit of (...)", html)) == {
+        "snx",
+        "sqx",
+        "smk",
+        "csx",
+        "bin",
+    }
+
+
+def test_a_nominal_run_far_from_the_other_homogeneous_ones_is_told(tmp_path, capsys):
+    """The runs of input/paper/baseline.nml, in which it happened."""
+    values = [6.565, 5.909, 5.935, 6.039, 5.928, 5.840, 5.952, 5.987]
+    write_ensemble(tmp_path / "far", [{**HOMOGENEOUS, "values": values}, base(20)])
+    html, numbers = report(tmp_path / "far", capsys)
+    floor = numbers["deterministic"]["runout_max"]
+    assert floor["nominal_is_outlier"] and "lies far outside the other 7" in html
+    assert floor["sd"] == pytest.approx(np.std(values, ddof=1))
+    assert floor["others"]["sd"] == pytest.approx(np.std(values[1:], ddof=1))
+    write_ensemble(tmp_path / "near", [HOMOGENEOUS, base(20)])
+    html, _ = report(tmp_path / "near", capsys)
+    assert "lies far outside" not in html
+
+
+def test_differences_below_the_noise_floor_are_called_so(tmp_path, capsys):
+    first = {**base(20), "label": "snx_cov0.10"}
+    noise = np.std(HOMOGENEOUS["values"], ddof=1)
+    for factor, is_below in ((0.5, True), (2.0, False)):
+        values = first["values"] - factor * noise
+        second = {**first, "label": "sqx_cov0.10", "acf": "sqx", "values": values}
+        write_ensemble(tmp_path / str(factor), [HOMOGENEOUS, first, second])
+        html, numbers = report(tmp_path / str(factor), capsys)
+        assert numbers["pairs"][0]["below_noise"] is is_below
+        assert ("smaller than the noise floor" in " ".join(html.split())) is is_below
+
+
+@pytest.mark.parametrize("shift", [0.0, -20.0])
+def test_a_deposit_is_drawn_where_it_lies(shift):
+    x, y = np.meshgrid(np.linspace(0, 10, 30), np.linspace(0, 5, 20))
+    points = np.column_stack([x.ravel() + shift, y.ravel()])
+    state = State(7, 1.0, points, np.full(len(points), 35.0))
+    figure = configuration_figure(Snapshot("base", 1, None, state), Geometry(point_spacing=0.25))
+    low, high = figure.axes[0].get_xlim()
+    assert low <= shift < shift + 10 <= high and high - low < 12
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no HDF5"])
