@@ -174,6 +174,8 @@ contains
     if (e > 0) then
       if (len(reason) > 0 .and. .not. nml%groups(g)%entries(e)%spoilt) then
         nml%groups(g)%entries(e)%usable = .false.
+        ! Where the deciding word is refused, that is the fault.
+        if (.not. decider_is_good(nml%groups(g), key)) return
         call faults%add(nml%groups(g)%entries(e)%line, where_is(key), 'does not apply here: '// &
           reason)
       end if
@@ -415,8 +417,10 @@ contains
     fault = ''
     if (len_trim(text) == 0) then
       fault = 'must not be empty'
-    else if (verify(trim(text), NAME_CHARACTERS) > 0) then
-      fault = quoted(text)//' is no name (allowed: letters, digits, _, - and .)'
+    else if (verify(trim(text), NAME_CHARACTERS) > 0 .or. scan(text(1:1), '-.') > 0) then
+      ! Names become parts of paths; '..' and '-x' would be something else there.
+      fault = quoted(text)//' is no name (allowed: letters, digits and _, and after the first '// &
+        'character also - and .)'
     else if (len_trim(text) > NAME_LENGTH) then
       fault = quoted(text)//' is too long (allowed: '//to_text(NAME_LENGTH)//' characters)'
     end if

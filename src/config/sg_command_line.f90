@@ -49,7 +49,12 @@ contains
       k = k + 1
     end do
     if (allocated(error)) return
-    if (options%help .or. options%version .or. options%keys .or. options%defaults) return
+    if (options%help .or. options%version) return
+    if (options%json .and. .not. options%keys) then
+      call fail('--json belongs to --keys', error)
+      return
+    end if
+    if (options%keys .or. options%defaults) return
     if (options%case_file == '') then
       call fail('no case file given. Usage: sgimp CASE.nml [options]; see sgimp --help', error)
     else if (options%realization == 0 .and. (options%snapshots .or. options%study_case /= '')) then
@@ -57,27 +62,55 @@ contains
     end if
   end subroutine parse_command_line
 
-  !> Takes word `k`, and the value behind it where the option has one.
+  !> Takes word `k`, and the value behind it where the option has one: `--option value` or
+  !> `--option=value`.
   subroutine take_word(words, k, options, error)
     character(len=*), intent(in) :: words(:)
     integer, intent(inout) :: k
     type(options_t), intent(inout) :: options
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: value
-    integer :: status
+    character(len=:), allocatable :: option
+    integer :: equals
 
-    select case (words(k))
+    option = trim(words(k))
+    equals = 0
+    if (index(option, '--') == 1) equals = index(option, '=')
+    if (equals > 0) option = option(:equals - 1)
+    select case (option)
+    case ('--study-case', '--output', '--realization', '--walltime')
+      if (equals > 0) then
+        call take_value(option, trim(words(k) (equals + 1:)), options, error)
+      else if (k == size(words)) then
+        call take_value(option, '', options, error)
+      else
+        k = k + 1
+        call take_value(option, trim(words(k)), options, error)
+      end if
+    case default
+      if (equals > 0 .and. any(KNOWN == option)) then
+        call fail(option//' takes no value: '//trim(words(k)), error)
+        return
+      end if
+      call take_flag(option, options, error)
+      if (option /= '--keys' .or. k == size(words)) return
+      if (words(k + 1) (1:1) == '-' .or. words(k + 1) == '') return
+      k = k + 1
+      options%keys_group = lower_case(trim(words(k)))
+      if (options%keys_group(1:1) == '&') options%keys_group = options%keys_group(2:)
+    end select
+  end subroutine take_word
+
+  !> An option without a value, or the case file.
+  subroutine take_flag(option, options, error)
+    character(len=*), intent(in) :: option
+    type(options_t), intent(inout) :: options
+    type(error_t), allocatable, intent(inout) :: error
+
+    select case (option)
     case ('--check')
       options%check = .true.
     case ('--keys')
       options%keys = .true.
-      if (k < size(words)) then
-        if (words(k + 1) (1:1) /= '-') call take_value('a group', options%keys_group)
-      end if
-      if (options%keys_group /= '') then
-        if (options%keys_group(1:1) == '&') options%keys_group = options%keys_group(2:)
-        options%keys_group = lower_case(options%keys_group)
-      end if
     case ('--json')
       options%json = .true.
     case ('--defaults')
@@ -90,40 +123,62 @@ contains
       options%version = .true.
     case ('--help', '-h')
       options%help = .true.
+    case default
+      call take_case_file(option, options, error)
+    end select
+  end subroutine take_flag
+
+  !> The value of an option. One that is empty or looks like an option has been forgotten; taken as
+  !> it is, it would start a run that was not asked for.
+  subroutine take_value(option, value, options, error)
+    character(len=*), intent(in) :: option, value
+    type(options_t), intent(inout) :: options
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: status
+
+    if (value == '' .or. index(value, '-') == 1) then
+      call fail(option//' needs '//what_it_needs(option)//instead_of(value), error)
+      return
+    end if
+    select case (option)
     case ('--study-case')
-      call take_value('the label of a case', options%study_case)
+      options%study_case = value
     case ('--output')
-      call take_value('a directory', options%output)
-    case ('--realization')
-      call take_value('a number', value)
-      if (allocated(error)) return
+      options%output = value
+    case ('--walltime')
+      call read_duration(value, options%walltime, error)
+    case default ! --realization
       read (value, *, iostat=status) options%realization
       if (status /= 0 .or. options%realization < 1 .or. verify(value, '0123456789') > 0) then
-        call fail('--realization needs a whole number from 1 on, not '//value, error)
+        call fail(option//' needs '//what_it_needs(option)//instead_of(value), error)
       end if
-    case ('--walltime')
-      call take_value('HH:MM:SS', value)
-      if (allocated(error)) return
-      call read_duration(value, options%walltime, error)
-    case default
-      call take_case_file(trim(words(k)), options, error)
     end select
+  end subroutine take_value
 
-  contains
+  pure function what_it_needs(option) result(text)
+    character(len=*), intent(in) :: option
+    character(len=:), allocatable :: text
 
-    subroutine take_value(what, text)
-      character(len=*), intent(in) :: what
-      character(len=:), allocatable, intent(out) :: text
+    select case (option)
+    case ('--study-case')
+      text = 'the label of a case'
+    case ('--output')
+      text = 'a directory'
+    case ('--walltime')
+      text = 'HH:MM:SS above zero'
+    case default ! --realization
+      text = 'a whole number from 1 on'
+    end select
+  end function what_it_needs
 
-      text = ''
-      if (k == size(words)) then
-        call fail(trim(words(k))//' needs '//what, error)
-        return
-      end if
-      k = k + 1
-      text = trim(words(k))
-    end subroutine take_value
-  end subroutine take_word
+  pure function instead_of(value) result(text)
+    character(len=*), intent(in) :: value
+    character(len=:), allocatable :: text
+
+    text = ''
+    if (value == '') return
+    text = ', not '//value
+  end function instead_of
 
   !> A word that is no option is the case file; there is only one.
   subroutine take_case_file(word, options, error)
@@ -169,7 +224,7 @@ contains
       first = first + mark
     end do
     if (status /= 0 .or. .not. seconds > 0.0_wp) then
-      call fail('--walltime needs HH:MM:SS above zero, not '//text, error)
+      call fail('--walltime needs '//what_it_needs('--walltime')//instead_of(text), error)
     end if
   end subroutine read_duration
 

@@ -1,6 +1,7 @@
 !> The schema for people and for programs: `--keys`, `--keys --json` and `--defaults`.
 module sg_key_listing
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
+  use sg_fault_list, only: did_you_mean
   use sg_schema, only: ANY_NUMBER, count_words, group_row, GROUPS, key_t, KEYS, KIND_INTEGER, &
     KIND_NAME, &
     KIND_REAL, KIND_TEXT, KIND_WORD, word_at
@@ -22,13 +23,16 @@ contains
     logical, intent(in) :: json
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
+    character(len=:), allocatable :: hint
     integer :: g, k
 
     text = ''
     if (group /= '') then
       if (group_row(group) == 0) then
+        hint = did_you_mean(group, GROUPS%name, '')
+        if (hint /= '') hint = ' ('//hint//')'
         call raise(error, EXIT_BAD_INPUT, &
-          'no group is called '//group//'; there are: '//group_names(), 'print_keys')
+          'there is no group '//group//hint//'; allowed: '//group_names(), 'print_keys')
         return
       end if
     end if
@@ -137,13 +141,15 @@ contains
     quoted_text = quoted_text//'"'
   end function json_text
 
-  !> A case file with every key that applies to the paper's case, as a start for one's own; it runs
-  !> as it is.
+  !> A case file with every key that applies to a column of sand over a random field, as a start for
+  !> one's own; it runs as it is. Defaults go before the values of the paper.
   function print_defaults() result(text)
     character(len=:), allocatable :: text
     integer :: g, k
 
-    text = '! Every key of the paper''s case. A key with a default may be left out.'//BREAK
+    text = '! A column of sand over a random field: each key that applies, with its default '// &
+      'where it has one,'//BREAK// &
+      '! else with the value of the paper. sgimp --keys tells which may be left out.'//BREAK
     do g = 1, size(GROUPS)
       text = text//BREAK//'! '//trim(GROUPS(g)%meaning)//BREAK//'&'//trim(GROUPS(g)%name)//BREAK
       do k = 1, size(KEYS)
