@@ -110,7 +110,7 @@ def _case(case, primary: str, floor: dict) -> dict:
         "field_mean": asdict(describe(case.column("field_mean")[ok])),
         "field_min": float(np.nanmin(case.column("field_min")[ok], initial=np.inf)),
         "field_max": float(np.nanmax(case.column("field_max")[ok], initial=-np.inf)),
-        "clipped": float(np.nanmean(case.column("field_clipped")[ok])) if ok.any() else np.nan,
+        "clipped": describe(case.column("field_clipped")[ok]).mean,
         "energy_error": float(np.nanmax(np.abs(case.column("energy_error")[ok]), initial=0.0)),
     }
 

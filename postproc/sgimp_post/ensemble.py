@@ -164,7 +164,7 @@ def read_ensemble(directory: Path) -> Ensemble:
             return _read_file(directory, path, file)
     except PostError:
         raise
-    except (OSError, KeyError, ValueError, RuntimeError, TypeError) as cause:
+    except (OSError, KeyError, ValueError, RuntimeError, TypeError, AttributeError) as cause:
         words = " ".join(str(cause).split())
         raise PostError(f"{path}: cannot be read ({words})") from cause
 

@@ -19,6 +19,10 @@ from .statistics import describe, exceedance, running
 #: Values up to which each one has its tick below the histogram; a tick takes 230 bytes of SVG.
 MOST_TICKS = 200
 
+#: Bins of a histogram at most. Freedman and Diaconis count range over spread: one far value among
+#: values close together would ask for millions.
+MOST_BINS = 100
+
 #: Okabe and Ito's palette, told apart by colour-blind readers.
 ACF_COLOURS = {
     "snx": "#D55E00",
@@ -112,11 +116,15 @@ def _histogram(axis, values, tint, deterministic):
     if len(values) == 0:
         axis.text(0.5, 0.5, "no values yet", ha="center", transform=axis.transAxes)
         return
-    bins = "fd" if len(values) >= 30 and np.ptp(values) > 0 else max(3, min(10, len(values) // 2))
-    axis.hist(values, bins=bins, density=True, color=tint, alpha=0.30, edgecolor="white")
+    margin = 0.25 * max(np.ptp(values), 1e-3)
+    # numpy refuses to cut a range of a few roundings into bins.
+    is_flat = np.ptp(values) <= 1e-12 * np.max(np.abs(values))
+    bars = {"bins": 10, "range": (values.min() - margin, values.max() + margin)}
+    if not is_flat:
+        bars = {"bins": _bin_count(values)}
+    axis.hist(values, **bars, density=True, color=tint, alpha=0.30, edgecolor="white")
     if len(values) <= MOST_TICKS:
         axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
-    margin = 0.25 * max(np.ptp(values), 1e-3)
     x = np.linspace(values.min() - margin, values.max() + margin, 300)
     for fit in fit_laws(values):
         if fit.note:
@@ -125,7 +133,18 @@ def _histogram(axis, values, tint, deterministic):
         axis.plot(x, distribution_of(fit).pdf(x), color=shade, ls=dash, lw=1.4, label=LAWS[fit.law])
     _mark_deterministic(axis, deterministic)
     axis.set_ylabel("density [1/m]")
-    axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=3)
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=3)
+
+
+def _bin_count(values) -> int:
+    """By Freedman and Diaconis from 30 values on, within MOST_BINS."""
+    if len(values) < 30:
+        return max(3, min(10, len(values) // 2))
+    low, high = np.percentile(values, [25, 75])
+    width = 2.0 * (high - low) / len(values) ** (1 / 3)
+    reach = np.ptp(values)
+    return max(1, int(np.ceil(reach / width))) if width * MOST_BINS > reach else MOST_BINS
 
 
 def _running(axis, values, tint, deterministic):
@@ -236,10 +255,18 @@ def study_figure(summary: dict):
     return figure
 
 
+def _depths(case) -> np.ndarray:
+    """Depths of the members that did not fail, as far as they are known."""
+    if case.profile_height is None:
+        return np.empty((0, 0))
+    heights = case.profile_height[case.ok]
+    return heights[np.isfinite(heights).all(axis=1)]
+
+
 @styled
 def profile_figure(cases, geometry):
     """Depth of the final deposit: median with the band from 5 to 95 % of the members."""
-    shown = [case for case in cases if case.profile_height is not None and case.ok.any()]
+    shown = [case for case in cases if len(_depths(case))]
     if not shown:
         return None
     columns = min(3, len(shown))
@@ -249,11 +276,7 @@ def profile_figure(cases, geometry):
     )
     reach = 0.0
     for axis, case in zip(axes.flat, shown):
-        heights = case.profile_height[case.ok]
-        heights = heights[np.isfinite(heights).all(axis=1)]
-        if len(heights) == 0:
-            continue
-        low, middle, high = np.percentile(heights, [5, 50, 95], axis=0)
+        low, middle, high = np.percentile(_depths(case), [5, 50, 95], axis=0)
         x = case.profile_x
         axis.fill_between(x, low, high, color=colour(case), alpha=0.30, lw=0, label="5 to 95 %")
         axis.plot(x, middle, color=colour(case), lw=1.4, label="median")
@@ -282,7 +305,7 @@ def configuration_figure(snapshot, geometry):
         return None
     left, bottom = np.min([state.position.min(axis=0) for state in states], axis=0)
     top = max(state.position[:, 1].max() for state in states)
-    spacing = geometry.point_spacing or (top - bottom) / 80
+    spacing = geometry.point_spacing or (top - bottom) / 80 or 1.0
     widths = [state.position[:, 0].max() - left + spacing for state in states]
     height = top - bottom + spacing
     figure, axes = plt.subplots(

@@ -37,7 +37,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
             **drawn,
             s=summary,
             a=ensemble.attributes,
-            directory=Path(directory),
+            directory=Path(directory).resolve(),
             verdict=verdict(summary),
             warnings=warnings(summary),
             runouts=RUNOUTS,
@@ -73,8 +73,10 @@ def verdict(summary: dict) -> list:
         if math.isfinite(floor["sd"]):
             line += (
                 f", mean of {floor['n']} runs with a noise floor of {floor['sd']:.3f} m;"
-                f" the nominal run alone gives {floor['nominal']:.3f} m"
+                " the nominal run "
             )
+            is_known = math.isfinite(floor["nominal"])
+            line += f"alone gives {floor['nominal']:.3f} m" if is_known else "has no result"
         lines.append(line + ".")
     for case in summary["cases"][:3] if len(summary["cases"]) <= 3 else []:
         lines.append(_case_sentence(case, summary))
@@ -246,7 +248,7 @@ def _number(value, digits: int = 3) -> str:
 
 
 def _write_csv(directory: Path, ensemble, summary: dict) -> None:
-    with open(directory / "members.csv", "w", newline="") as file:
+    with open(directory / "members.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         names = (*FLOAT_COLUMNS, *INTEGER_COLUMNS)
         writer.writerow(["case", "id", "status", *names, "reason"])
@@ -255,7 +257,7 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
                 row = [case.column(name)[k].item() for name in names]
                 status = STATUS_TEXTS.get(int(case.status[k]), int(case.status[k]))
                 writer.writerow([case.label, int(case.id[k]), status, *row, case.reason[k]])
-    with open(directory / "summary.csv", "w", newline="") as file:
+    with open(directory / "summary.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         statistics = (
             "n",
@@ -275,7 +277,7 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
         for label, runouts in rows:
             for name in RUNOUTS:
                 writer.writerow([label, name, *(runouts[name][key] for key in statistics)])
-    with open(directory / "fits.csv", "w", newline="") as file:
+    with open(directory / "fits.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(
             ["case", "law", "n", "k", "log_likelihood", "aic", "bic", "parameters", "note"]

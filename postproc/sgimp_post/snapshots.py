@@ -74,4 +74,6 @@ def _read_state(file: h5py.File, step: int, name: str) -> State:
         else np.full(len(position), np.nan)
     )
     keep = np.isfinite(position).all(axis=1)
+    if len(angle) != len(position) or not keep.any():
+        raise ValueError("no points, or not one friction angle a point")
     return State(step, time, position[keep], angle[keep])

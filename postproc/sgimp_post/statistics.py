@@ -111,8 +111,12 @@ def describe(values, confidence: float = CONFIDENCE) -> Description:
 def wilson(count: int, n: int, confidence: float = CONFIDENCE) -> Proportion:
     if n == 0:
         return Proportion(0, 0, np.nan, np.nan, np.nan)
-    interval = stats.binomtest(int(count), int(n)).proportion_ci(confidence, method="wilson")
-    return Proportion(int(count), int(n), count / n, float(interval.low), float(interval.high))
+    z2 = float(stats.norm.ppf(0.5 + 0.5 * confidence)) ** 2
+    centre = (count + 0.5 * z2) / (n + z2)
+    half = float(np.sqrt(z2 * (count * (n - count) / n + 0.25 * z2))) / (n + z2)
+    low = centre - half if count > 0 else 0.0  # exact at the ends, where rounding would show
+    high = centre + half if count < n else 1.0
+    return Proportion(int(count), int(n), count / n, float(low), float(high))
 
 
 def probability_above(values, threshold: float, confidence: float = CONFIDENCE) -> Proportion:
