@@ -63,3 +63,20 @@ def test_gumbel_estimates_scatter_as_theory_says():
 def test_too_few_or_equal_values_have_a_note(values):
     assert all(fit.note for fit in fit_laws(values))
     assert best_fit(fit_laws(values)) is None
+
+
+@pytest.mark.parametrize("low", [0.0, -1.0])
+def test_values_not_above_zero_leave_the_laws_on_the_whole_line(low):
+    fits = by_law(np.r_[low, VALUES])
+    assert "above zero" in fits["lognormal"].note and "above zero" in fits["weibull"].note
+    assert not fits["normal"].note and not fits["gumbel"].note
+
+
+def test_weights_are_shares_and_the_best_law_has_the_largest():
+    fits = fit_laws(VALUES)
+    assert sum(fit.weight for fit in fits) == pytest.approx(1.0, abs=1e-12)
+    best = max(fits, key=lambda fit: fit.weight)
+    assert best_fit(fits) == best and best.delta_aic == 0.0
+    for fit in fits:
+        ratio = np.exp(0.5 * (best.aic - fit.aic))
+        assert fit.weight / best.weight == pytest.approx(ratio, rel=1e-12)

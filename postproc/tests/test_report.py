@@ -1,18 +1,21 @@
 """The report on whole, running, failed and empty ensembles."""
 
+import csv
 import json
 import re
 import shutil
 import subprocess
+import sys
 
+import h5py
 import numpy as np
 import pytest
-from synthetic import sample, write_ensemble
+from synthetic import RUNOUTS_FACTOR, sample, write_ensemble
 
 from sgimp_post.cli import main
 from sgimp_post.ensemble import Geometry
 from sgimp_post.figures import configuration_figure
-from sgimp_post.snapshots import Snapshot, State
+from sgimp_post.snapshots import Snapshot, State, read_snapshot
 
 HOMOGENEOUS = {"label": "deterministic", "values": sample(1, 8, 5.6, 0.05)}
 
@@ -36,12 +39,16 @@ ENSEMBLES = {
     "one case": ([HOMOGENEOUS, base(50)], "complete"),
     "deterministic only": ([HOMOGENEOUS], "complete"),
     "one member": ([{**HOMOGENEOUS, "values": [5.6]}], "complete"),
-    "study": ([HOMOGENEOUS, *study(12)], "complete"),
     "empty": ([{**HOMOGENEOUS, "values": []}, base(0, planned=10)], "running"),
     "one row": ([HOMOGENEOUS, base(1, planned=10)], "running"),
     "two rows": ([HOMOGENEOUS, base(2, planned=10)], "running"),
     "partial": ([HOMOGENEOUS, base(6, ids=[1, 2, 3, 5, 8, 9], planned=10)], "stopped"),
     "all failed": ([HOMOGENEOUS, base(4, failed=[1, 2, 3, 4])], "complete"),
+    "nominal failed": ([{**HOMOGENEOUS, "failed": [1]}, base(5)], "complete"),
+    "not compared": ([base(2)], "complete"),
+    "not finite": ([HOMOGENEOUS, {**base(4), "values": [5.1, np.nan, np.inf, 5.3]}], "complete"),
+    "one far": ([HOMOGENEOUS, {**base(0), "values": [*sample(2, 49), 1e9]}], "complete"),
+    "almost equal": ([HOMOGENEOUS, {**base(0), "values": [5.0] * 8 + [5.0 + 1e-15]}], "complete"),
 }
 
 
@@ -54,20 +61,41 @@ def report(directory, capsys):
     return html, json.loads((directory / "report" / "report.json").read_text())
 
 
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """For tests of words and numbers: drawing is nine tenths of the time."""
+    names = ("comparison", "study", "profiles")
+    drawn = {"case_figures": {}, "configurations": [], **dict.fromkeys(names)}
+    monkeypatch.setattr("sgimp_post.report._figures", lambda *_: drawn)
+
+
+def assert_page_is_sound(html, directory):
+    """Offline, no script, no dead link, no value that is not one, files that can be read."""
+    assert len(html) < 5_000_000
+    assert not re.search(r"(src|href)=\"(https?:)?//", html) and "<script" not in html
+    for target in re.findall(r'href="#([^"]+)"', html):
+        assert f'id="{target}"' in html
+    targets = re.findall(r'href="([^"#]+)"', html)
+    assert {"members.csv", "summary.csv", "fits.csv", "report.json"} <= set(targets)
+    for target in targets:
+        assert (directory / target).is_file()
+    for path in directory.glob("*.csv"):
+        with open(path, newline="", encoding="utf-8") as file:
+            assert len({len(row) for row in csv.reader(file)}) == 1
+    assert not re.search(r"\b(nan|inf)\b", re.sub(r"data:[^\"]+", "", html))
+
+
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", ENSEMBLES)
 def test_every_kind_of_ensemble_gives_a_sound_page(name, tmp_path, capsys):
     cases, state = ENSEMBLES[name]
     write_ensemble(tmp_path, cases, state, snapshots=[("deterministic", 1)])
     html, _ = report(tmp_path, capsys)
-    assert len(html) < 5_000_000
-    assert not re.search(r"(src|href)=\"(https?:)?//", html) and "<script" not in html
-    for target in re.findall(r'href="#([^"]+)"', html):
-        assert f'id="{target}"' in html
-    for target in re.findall(r'href="([^"#]+)"', html):
-        assert (tmp_path / "report" / target).is_file()
-    assert "nan" not in re.sub(r"data:[^\"]+", "", html).lower().replace("provenance", "")
+    assert_page_is_sound(html, tmp_path / "report")
+    assert ("the nominal run has no result" in html) is (name == "nominal failed")
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_numbers_are_those_of_the_sample(tmp_path, capsys):
     case = base(50)
     write_ensemble(tmp_path, [HOMOGENEOUS, case])
@@ -79,8 +107,26 @@ def test_numbers_are_those_of_the_sample(tmp_path, capsys):
     above = np.mean(values > np.mean(HOMOGENEOUS["values"]))
     assert got["exceedance"]["value"] == pytest.approx(above)
     assert f"mean {values.mean():.3f} m" in html
+    for name, factor in RUNOUTS_FACTOR.items():
+        runout, x = got["runouts"][name], factor * values
+        assert runout["n"] == 50
+        assert [runout[key] for key in ("minimum", "p05", "median", "p95", "maximum")] == (
+            pytest.approx(np.percentile(x, [0, 5, 50, 95, 100]), rel=1e-12)
+        )
+        half = 2.0095752 * x.std(ddof=1) / np.sqrt(50)  # Student's t, 49 degrees, 97.5 %
+        assert runout["mean_high"] - runout["mean"] == pytest.approx(half, rel=1e-7)
+    with open(tmp_path / "report" / "members.csv", newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["case"] == "base"]
+    assert [float(row["runout_max"]) for row in rows] == list(values)
+    with open(tmp_path / "report" / "summary.csv", newline="", encoding="utf-8") as file:
+        rows = {(row["case"], row["runout"]): row for row in csv.DictReader(file)}
+    assert float(rows["base", "runout_max"]["sd"]) == got["runouts"]["runout_max"]["sd"]
+    assert float(rows["deterministic", "runout_max"]["mean"]) == pytest.approx(
+        np.mean(HOMOGENEOUS["values"]), rel=1e-12
+    )
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_stopped_run_counts_no_member_behind_a_gap(tmp_path, capsys):
     cases, state = ENSEMBLES["partial"]
     write_ensemble(tmp_path, cases, state)
@@ -89,6 +135,7 @@ def test_a_stopped_run_counts_no_member_behind_a_gap(tmp_path, capsys):
     assert "without a gap" in html
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_failed_members_are_listed_with_their_reason(tmp_path, capsys):
     write_ensemble(tmp_path, [HOMOGENEOUS, base(9, failed=[4])])
     html, numbers = report(tmp_path, capsys)
@@ -98,6 +145,7 @@ def test_failed_members_are_listed_with_their_reason(tmp_path, capsys):
     assert "point left the grid" in html and "point lost" in html
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_pairs_use_the_same_realizations(tmp_path, capsys):
     first = {**base(20), "label": "snx_cov0.10"}
     second = {**first, "label": "sqx_cov0.10", "acf": "sqx", "values": first["values"] - 0.25}
@@ -113,7 +161,9 @@ def test_a_full_study_stays_within_five_megabytes(tmp_path, capsys):
     snapshots = [(case["label"], 1) for case in cases]
     write_ensemble(tmp_path, [HOMOGENEOUS, *cases], snapshots=snapshots)
     html, _ = report(tmp_path, capsys)
+    assert_page_is_sound(html, tmp_path / "report")
     assert len(html) < 5_000_000 - 6 * 160_000
+    assert "Heterogeneous ground, 15 cases:" in html
     assert set(re.findall(r"alt=\"Field and deposit of (...)", html)) == {
         "snx",
         "sqx",
@@ -123,6 +173,7 @@ def test_a_full_study_stays_within_five_megabytes(tmp_path, capsys):
     }
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_a_nominal_run_far_from_the_other_homogeneous_ones_is_told(tmp_path, capsys):
     """The runs of input/paper/baseline.nml, in which it happened."""
     values = [6.565, 5.909, 5.935, 6.039, 5.928, 5.840, 5.952, 5.987]
@@ -137,6 +188,7 @@ def test_a_nominal_run_far_from_the_other_homogeneous_ones_is_told(tmp_path, cap
     assert "lies far outside" not in html
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_differences_below_the_noise_floor_are_called_so(tmp_path, capsys):
     first = {**base(20), "label": "snx_cov0.10"}
     noise = np.std(HOMOGENEOUS["values"], ddof=1)
@@ -166,6 +218,91 @@ def test_bad_input_is_one_line_and_exit_code_2(content, tmp_path, capsys):
     assert main(["report", str(tmp_path)]) == 2
     message = capsys.readouterr().err
     assert message.startswith("sgimp-post: ") and message.count("\n") == 1
+
+
+def replace(path, name, value):
+    """Puts `value` in place of what has that name in an HDF5 file."""
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file[name] = value
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("cases", [1, 2], "cannot be read"),
+        ("cases/base", [1, 2], "case base has no dataset id"),
+        ("cases/base/runout_max", [1.0], "1 rows of runout_max for 4 members"),
+        ("cases/base/profile/height", np.ones((4, 3)), "expected (4, 40)"),
+    ],
+)
+def test_a_file_that_does_not_fit_is_named(name, value, words, tmp_path, capsys):
+    write_ensemble(tmp_path, [base(4)])
+    replace(tmp_path / "ensemble.h5", name, value)
+    assert main(["report", str(tmp_path)]) == 2
+    message = capsys.readouterr().err
+    assert "ensemble.h5" in message and words in message and message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("position", np.empty((0, 2))),
+        ("position", np.full((64, 2), np.nan)),
+        ("friction_angle", np.full(3, 35.0)),
+    ],
+)
+def test_a_snapshot_that_cannot_be_drawn_is_left_out(name, value, tmp_path):
+    write_ensemble(tmp_path, [base(1)], snapshots=[("base", 1)])
+    path = tmp_path / "snapshots" / "base_r000001.h5"
+    assert read_snapshot("base", 1, path) is not None
+    replace(path, f"step_000100/{name}", value)
+    assert read_snapshot("base", 1, path) is None
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_texts_of_the_run_are_text_in_the_page(tmp_path, capsys):
+    write_ensemble(tmp_path, [base(3, failed=[2])])
+    replace(tmp_path / "ensemble.h5", "cases/base/reason", ["", "<script>alert('ü')</script>", ""])
+    html, numbers = report(tmp_path, capsys)
+    assert "<script" not in html and "&lt;script&gt;" in html
+    assert numbers["failures"][0]["reason"] == "<script>alert('ü')</script>"
+
+
+def test_the_command_line(tmp_path):
+    """As a user calls it: from inside the directory, another definition, another place."""
+    write_ensemble(tmp_path / "dir", [base(5)])
+    command = [sys.executable, "-m", "sgimp_post", "report"]
+    done = subprocess.run(
+        [*command, ".", "--runout", "runout_q99", "--output", "../other/page.html"],
+        cwd=tmp_path / "dir",
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "../other/page.html\n", "")
+    html = (tmp_path / "other" / "page.html").read_text(encoding="utf-8")
+    assert "<title>SGIMP: dir</title>" in html
+    assert_page_is_sound(html, tmp_path / "other")
+    numbers = json.loads((tmp_path / "other" / "report.json").read_text())
+    assert numbers["primary"] == "runout_q99"
+    assert not (tmp_path / "dir" / "report").exists()
+
+
+@pytest.mark.parametrize("arguments", [[], ["rapport"], ["report", ".", "--runout", "far"]])
+def test_a_wrong_command_is_exit_code_2(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2 and "usage: sgimp-post" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_place_that_cannot_be_written_is_one_line(tmp_path, capsys):
+    write_ensemble(tmp_path, [base(1)])
+    (tmp_path / "file").write_text("")
+    assert main(["report", str(tmp_path), "--output", str(tmp_path / "file" / "page.html")]) == 2
+    message = capsys.readouterr().err
+    assert "cannot be written" in message and message.count("\n") == 1
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium")
