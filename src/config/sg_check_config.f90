@@ -1,9 +1,9 @@
 !> What several keys of a case must satisfy together. A check is made only where all keys it looks
 !> at have passed on their own, so that one mistake gives one fault.
 module sg_check_config
-  use sg_config, only: body_config_t, config_t
+  use sg_config, only: config_t
   use sg_fault_list, only: did_you_mean, fault_list_t, quoted
-  use sg_kinds, only: i8, wp
+  use sg_kinds, only: wp
   use sg_namelist, only: namelist_t
   use sg_polygon, only: corners_are_distinct, polygon_area, polygon_is_simple
   use sg_schema, only: count_words, key_row, KEYS, word_at

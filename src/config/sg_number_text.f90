@@ -6,7 +6,7 @@ module sg_number_text
   implicit none
   private
 
-  public :: parse_real, parse_integer, range_holds, range_in_words, range_bounds
+  public :: parse_real, parse_integer, range_holds, range_in_words
 
   character(len=*), parameter :: DIGITS = '0123456789'
 

@@ -4,7 +4,7 @@ module sg_resolved
   use sg_check_keys, only: why_not
   use sg_config, only: config_t, NAME_LENGTH
   use sg_config_fields, only: config_visitor_t, visit_config
-  use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
+  use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
   use sg_namelist, only: namelist_t, nml_entry_t
   use sg_number_text, only: range_holds
@@ -38,8 +38,7 @@ module sg_resolved
 contains
 
   !> A complete case file: every key that applies, one a line; reading it gives the same
-  !> configuration
-  !> to the last bit.
+  !> configuration to the last bit.
   function resolved_text(config) result(text)
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: text
@@ -119,8 +118,7 @@ contains
   end subroutine compare_configs
 
   !> Compares group `g` of `here` with group `o` of `there` (0: not there). `backwards`: `here` is
-  !> the
-  !> new file, and only what the old one has not got is of interest.
+  !> the new file, and only what the old one has not got is of interest.
   subroutine compare_groups(here, g, there, o, backwards, differences)
     type(namelist_t), intent(in) :: here, there
     integer, intent(in) :: g, o

@@ -15,8 +15,6 @@ module sg_hdf5_file
 
   public :: hdf5_file_t
 
-  !> Local buffers whose address alone is handed on are volatile: gfortran 12 drops stores to them.
-  !>
   !> Errors are kept and told by `close`, so that a file is written without a test in every line;
   !> after the first one, the other calls do nothing.
   type :: hdf5_file_t
@@ -172,7 +170,7 @@ contains
     character(len=*), intent(in) :: name
     character(len=*), intent(in) :: values(:)
     character(len=*), intent(in), optional :: units
-    character(kind=c_char, len=1), allocatable, target, volatile :: chars(:)
+    character(kind=c_char, len=1), allocatable, target :: chars(:)
     integer(hid_t) :: kind
     integer :: i, j, length
 
@@ -197,7 +195,7 @@ contains
     character(len=*), intent(in) :: name
     real(wp), intent(in) :: value
     character(len=*), intent(in), optional :: units
-    real(wp), target, volatile :: copy(1)
+    real(wp), target :: copy(1)
     integer :: none(0)
 
     copy = value
@@ -266,7 +264,7 @@ contains
   subroutine attribute_text(this, path, name, value)
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name, value
-    character(kind=c_char, len=1), allocatable, target, volatile :: chars(:)
+    character(kind=c_char, len=1), allocatable, target :: chars(:)
     integer(hid_t) :: kind
     integer :: i
 
@@ -286,7 +284,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     integer(i4), intent(in) :: value
-    integer(i4), target, volatile :: copy
+    integer(i4), target :: copy
 
     copy = value
     call write_attribute(this, path, name, h5kind_to_type(i4, H5_INTEGER_KIND), c_loc(copy))
@@ -296,7 +294,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     integer(i8), intent(in) :: value
-    integer(i8), target, volatile :: copy
+    integer(i8), target :: copy
 
     copy = value
     call write_attribute(this, path, name, h5kind_to_type(i8, H5_INTEGER_KIND), c_loc(copy))
@@ -306,7 +304,7 @@ contains
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path, name
     real(wp), intent(in) :: value
-    real(wp), target, volatile :: copy
+    real(wp), target :: copy
 
     copy = value
     call write_attribute(this, path, name, h5kind_to_type(wp, H5_REAL_KIND), c_loc(copy))

@@ -11,7 +11,7 @@ module sg_posix
   public :: append_file_t
   public :: catch_signals, caught_signal
   public :: end_program
-  public :: file_exists, file_size, read_file, read_text, replace_file, write_file, make_directory
+  public :: file_exists, read_file, read_text, replace_file, write_file, make_directory
   public :: remove_file, remove_files
   public :: host_name, utc_time, sleep_seconds, checksum, hash_text
 
@@ -249,14 +249,6 @@ contains
 
     exists = sg_file_size(c_text(path)) >= 0
   end function file_exists
-
-  !> In bytes; -1 if there is no such file.
-  function file_size(path) result(length)
-    character(len=*), intent(in) :: path
-    integer(i8) :: length
-
-    length = max(-1_i8, int(sg_file_size(c_text(path)), i8))
-  end function file_size
 
   !> The whole file as bytes.
   subroutine read_file(path, bytes, error)

@@ -33,10 +33,8 @@ contains
   end function body_extent
 
   !> Points at the centres of the lattice cells whose centre lies in the body, x fastest. The
-  !> lattice starts at the
-  !> lower left corner of the body's box; its spacing is `cell_size` over the points per cell, or a
-  !> little less where
-  !> the box is no multiple of it.
+  !> lattice starts at the lower left corner of the body's box; its spacing is `cell_size` over the
+  !> points per cell, or a little less where the box is no multiple of it.
   pure subroutine fill_body(body, cell_size, lattice)
     type(body_config_t), intent(in) :: body
     real(wp), intent(in) :: cell_size

@@ -1,10 +1,9 @@
 !> The background grid: square cells, nodes that live for one step, and the walls.
 !>
 !> Nodes are counted from 0; two layers of nodes lie outside the walls, so that the weighting
-!> function of a point
-!> at a wall has its full stencil. Only nodes in the window around the points are touched. Whoever
-!> reads
-!> the sums last clears them, so that they are zero when points are next mapped.
+!> function of a point at a wall has its full stencil. Only nodes in the window around the points
+!> are touched. Whoever reads the sums last clears them, so that they are zero when points are next
+!> mapped.
 module sg_grid
   use sg_config, only: grid_config_t
   use sg_kinds, only: wp
@@ -31,9 +30,8 @@ module sg_grid
     !> Kinetic energy in J/m, largest speed squared and largest wave speed squared in (m/s)^2.
     real(wp) :: kinetic_energy, speed_squared, wave_squared
     !> Kinetic energy of the motion of the points, with the velocities they are moved with, J/m. A
-    !> point can keep a
-    !> velocity that the grid does not see; it moves nothing, and so does not count when rest is
-    !> looked for.
+    !> point can keep a velocity that the grid does not see; it moves nothing, and so does not count
+    !> when rest is looked for.
     real(wp) :: motion_energy
     !> Work of the stresses in this step, J/m.
     real(wp) :: internal_work
@@ -53,8 +51,7 @@ module sg_grid
     !> Mass below which a node counts as empty, kg/m.
     real(wp) :: least_mass
     !> Storage of the nodes. What counts begins at element `total_start` and `motion_start` on a
-    !> cache line, as
-    !> total(8, 0:nx, 0:ny) and motion(4, 0:nx, 0:ny), see sg_transfer; hand over
+    !> cache line, as total(8, 0:nx, 0:ny) and motion(4, 0:nx, 0:ny), see sg_transfer; hand over
     !> total_store(total_start).
     real(wp), allocatable :: total_store(:), motion_store(:)
     integer :: total_start, motion_start
@@ -141,8 +138,7 @@ contains
   end function wall_kind
 
   !> The window that covers the stencils of all points of the tally; one node more on every side,
-  !> since the
-  !> domain of a point is up to a cell wide.
+  !> since the domain of a point is up to a cell wide.
   pure subroutine set_window(this, tally)
     class(grid_t), intent(inout) :: this
     type(tally_t), intent(in) :: tally
@@ -224,8 +220,7 @@ contains
   end subroutine find_velocity
 
   !> motion = (v_i, p_i/m_i): the velocity that moves the points stays, beside the one mapped back
-  !> from the
-  !> updated points, from which strains follow (scheme musl). Clears the sums.
+  !> from the updated points, from which strains follow (scheme musl). Clears the sums.
   subroutine remap_velocity(this)
     class(grid_t), intent(inout) :: this
 

@@ -53,8 +53,7 @@ contains
   end function create_material
 
   !> Strength of a point with the friction angle `friction_angle` in degrees: sin(phi), 2 c
-  !> cos(phi), and the
-  !> largest tension, min(tension strength, c cot(phi)).
+  !> cos(phi), and the largest tension, min(tension strength, c cot(phi)).
   elemental subroutine mohr_coulomb_strength(material, friction_angle, sin_friction, &
     cohesion_term, tension_limit)
     type(material_t), intent(in) :: material

@@ -1,6 +1,5 @@
 !> Someone who looks at a simulation while it runs. The solver calls; what is done with it (files,
-!> arrays for a test)
-!> is the observer's business. Watching never changes a time step.
+!> arrays for a test) is the observer's business. Watching never changes a time step.
 module sg_observer
   use sg_kinds, only: wp
   use sg_particles, only: particles_t

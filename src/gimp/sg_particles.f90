@@ -34,8 +34,7 @@ module sg_particles
     !> Volumetric opening of a point that carries no stress, [count]; a strain >= 0.
     real(wp), allocatable :: gap(:)
     !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the
-    !> largest
-    !> principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
+    !> largest principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
     real(wp), allocatable :: sin_friction(:), cohesion_term(:), tension_limit(:)
     !> Friction angle as it was given, [count], in degrees; for output only.
     real(wp), allocatable :: friction_angle(:)

@@ -30,9 +30,8 @@ contains
     end do
   end function farthest_edge
 
-  !> Positions behind which the given shares of the mass lie, in m: the centre of the point at
-  !> which the mass
-  !> summed from the right passes the rest.
+  !> Positions behind which the given shares of the mass lie, in m: the centre of the point at which
+  !> the mass summed from the right passes the rest.
   function mass_front(particles, shares) result(x)
     type(particles_t), intent(in) :: particles
     real(wp), intent(in) :: shares(:)
@@ -81,8 +80,7 @@ contains
   end function deposit_depth
 
   !> End of the deposit still joined to the main body, in m: walking from the column of `source_x`
-  !> along x, the right
-  !> end of the last column before the depth falls below `least_depth`.
+  !> along x, the right end of the last column before the depth falls below `least_depth`.
   pure function connected_front(depth, x_min, column_width, source_x, least_depth) result(x)
     real(sp), intent(in) :: depth(:)
     real(wp), intent(in) :: x_min, column_width, source_x, least_depth

@@ -3,7 +3,7 @@
 module sg_simulation
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use sg_config, only: config_t
-  use sg_kinds, only: sp, wp
+  use sg_kinds, only: wp
   use sg_initial_stress, only: make_admissible
   use sg_monitor, only: ABANDON, monitor_t, OUT_OF_TIME
   use sg_observer, only: history_row_t, observer_t
@@ -14,8 +14,7 @@ module sg_simulation
     STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
   use sg_particles, only: copy_particles
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
-    farthest_edge, &
-    mass_front, potential_energy, surface_height
+    farthest_edge, mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle
   use sg_solver, only: solver_t
   use sg_text, only: to_text
@@ -26,14 +25,13 @@ module sg_simulation
   public :: simulate, variation_t
 
   !> How a member differs from the scene. The defaults change nothing; the homogeneous members of a
-  !> study use the
-  !> others for changes that mean nothing physically.
+  !> study use the others for changes that mean nothing physically.
   type :: variation_t
     !> Factor on the CFL number or on the fixed step.
     real(wp) :: step_factor = 1.0_wp
     !> Relative growth of the cells about the lower left corner. Walls must stay on lines of nodes,
-    !> so the lines
-    !> inside the body are shifted by stretching: by a whole cell at the toe for cell_size/width.
+    !> so the lines inside the body are shifted by stretching: by a whole cell at the toe for
+    !> cell_size/width.
     real(wp) :: cell_stretch = 0.0_wp
     !> Friction angles of the points of one material, in degrees; not allocated: as the material
     !> says.
@@ -45,18 +43,15 @@ module sg_simulation
   integer, parameter :: POINTS_PER_QUESTION = 100000
   !> A step below this share of the first one counts as collapsed.
   real(wp), parameter :: COLLAPSED_STEP = 1.0e-4_wp
-  !> A point counts as lost once its centre is this share of a cell outside. At a closed wall it
-  !> can come no
-  !> farther than half its own width: there all nodes it reaches are held. A point without stress
-  !> may sink in so far.
+  !> A point counts as lost once its centre is this share of a cell outside. At a closed wall it can
+  !> come no farther than half its own width: there all nodes it reaches are held. A point without
+  !> stress may sink in so far.
   real(wp), parameter :: OUTSIDE_MARGIN = 0.51_wp
   !> A speed this many times above all that the scene can explain (wave speed, fall through the
-  !> domain, initial
-  !> speed) counts as runaway.
+  !> domain, initial speed) counts as runaway.
   real(wp), parameter :: RUNAWAY_FACTOR = 10.0_wp
   !> "Stays below": for one fundamental period of the body, 4 H/c, so that the turning points of an
-  !> elastic
-  !> oscillation do not pass for rest.
+  !> elastic oscillation do not pass for rest.
   real(wp), parameter :: SETTLE_PERIODS = 1.0_wp
 
   !> The clock of a simulation and what it remembers of the past.
@@ -65,8 +60,8 @@ module sg_simulation
     !> Step that the observer was last shown.
     integer :: shown_step = -1
     real(wp) :: time = 0.0_wp, time_step = 0.0_wp
-    real(wp) :: peak_energy = 0.0_wp, calm_since = 0.0_wp, calm_needed = 0.0_wp, &
-      speed_limit = 0.0_wp
+    real(wp) :: peak_energy = 0.0_wp, speed_limit = 0.0_wp
+    real(wp) :: calm_since = 0.0_wp, calm_needed = 0.0_wp
     real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
     real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp
     logical :: settled = .false.
@@ -128,8 +123,9 @@ contains
       call set_friction_angle(solver%materials, variation%material, variation%friction_angle, &
         solver%particles)
     end if
-    if (config%loading%initial_stress == 'geostatic') call make_admissible(solver%particles, &
-      solver%materials)
+    if (config%loading%initial_stress == 'geostatic') then
+      call make_admissible(solver%particles, solver%materials)
+    end if
     call solver%configure(config)
     call solver%grid%init(config%grid, variation%cell_stretch, minval(solver%particles%mass))
     call solver%start()
@@ -144,8 +140,7 @@ contains
 
     clock%peak_energy = solver%tally%kinetic_energy ! at the start both are the same
     clock%calm_needed = SETTLE_PERIODS*4.0_wp*max(scene%extent(2) - scene%extent(1), &
-      scene%extent(4) - scene%extent(3)) &
-      /scene%wave_speed
+      scene%extent(4) - scene%extent(3))/scene%wave_speed
     fall = norm2(config%loading%gravity) &
       *(config%grid%x_max - config%grid%x_min + config%grid%y_max - config%grid%y_min)
     clock%speed_limit = RUNAWAY_FACTOR*(scene%wave_speed + scene%speed + sqrt(2.0_wp*fall))
@@ -337,11 +332,10 @@ contains
       v(RUNOUT_Q99) = front(1) - scene%toe
       v(RUNOUT_Q995) = front(2) - scene%toe
       outcome%height = deposit_depth(s, scene%materials, g%x_min, cell, size(scene%profile_x))
-      ! Half the height of a point, spread over a column of cells.
+      ! The depth of a single point in a column of cells: with 2 x 2 points a cell half its height.
       point_depth = minval(s%bodies%width*s%bodies%height)/cell
-      v(RUNOUT_CONNECTED) = connected_front(outcome%height, g%x_min, cell, scene%extent(1) &
-        + 0.5_wp*cell, &
-                                            point_depth) - scene%toe
+      v(RUNOUT_CONNECTED) = connected_front(outcome%height, g%x_min, cell, &
+                                            scene%extent(1) + 0.5_wp*cell, point_depth) - scene%toe
       v(HEIGHT_MAX) = surface_height(s, -huge(1.0_wp), huge(1.0_wp), g%y_min) - g%y_min
       v(HEIGHT_WALL) = surface_height(s, scene%extent(1), scene%extent(1) + cell, g%y_min) - g%y_min
       v(SETTLED) = merge(1.0_wp, 0.0_wp, clock%settled)

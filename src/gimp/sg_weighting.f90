@@ -1,9 +1,8 @@
 !> Weighting functions S_ip and their slopes, one axis at a time; the 2-D function is the product.
 !>
 !> All kinds share one stencil of three nodes an axis, counted from `base`, so that one transfer
-!> kernel serves
-!> them all. Node k (from 0) lies at `origin + k h`. Lengths below are in cells: xi = (x -
-!> origin)/h.
+!> kernel serves them all. Node k (from 0) lies at `origin + k h`. Lengths below are in cells: xi =
+!> (x - origin)/h.
 !>
 !> uGIMP (Bardenhagen & Kober 2004; closed form without branches), w = width of the point in cells,
 !> 0 < w <= 1:
@@ -33,8 +32,8 @@ module sg_weighting
 
   abstract interface
     !> Weights of `n` points along one axis. `last_base` is the largest allowed first node: a point
-    !> outside the
-    !> grid is held inside, so that no array is overrun before the end of the step reports it lost.
+    !> outside the grid is held inside, so that no array is overrun before the end of the step
+    !> reports it lost.
     pure subroutine axis_weights_interface(n, x, origin, inverse_cell, width, last_base, base, s, g)
       import :: wp, BLOCK
       implicit none

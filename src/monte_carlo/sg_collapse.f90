@@ -22,10 +22,9 @@ module sg_collapse
 
   public :: collapse_model_t
 
-  !> Homogeneous members beyond the first: CFL number within +-20 %, lines of the grid shifted by
-  !> up to a cell at the
-  !> toe, friction within 1e-6. None of it means anything physically; the spread it makes is the
-  !> noise floor.
+  !> Homogeneous members beyond the first: CFL number within +-20 %, lines of the grid shifted by up
+  !> to a cell at the toe, friction within 1e-6. None of it means anything physically; the spread it
+  !> makes is the noise floor.
   real(wp), parameter :: STEP_SPREAD = 0.2_wp
   real(wp), parameter :: FRICTION_SPREAD = 1.0e-6_wp
 
@@ -118,10 +117,10 @@ contains
       return
     end if
     if (this%is_recorded(id)) then
-      call recorder%open(this%config%output%directory, trim(this%plan%cases(case_index)%label), &
-        id, &
-                         this%config%output%snapshot_interval, &
-                         this%config%output%history_interval, error)
+      associate (output => this%config%output)
+        call recorder%open(output%directory, trim(this%plan%cases(case_index)%label), id, &
+                           output%snapshot_interval, output%history_interval, error)
+      end associate
       if (.not. allocated(error)) then
         call simulate(this%config, this%scene, variation, monitor, recorder, outcome)
         if (outcome%status /= STATUS_ABANDONED) call recorder%close(error)
@@ -185,8 +184,7 @@ contains
       variation%material = field%material_index
       allocate (variation%friction_angle(this%scene%point_count(field%material_index)))
       call this%fields(k)%realize(this%config%monte_carlo%seed, FIELD_STREAM, id, &
-        variation%friction_angle, &
-                                  clipped, error)
+                                  variation%friction_angle, clipped, error)
     end associate
   end subroutine vary_by_field
 

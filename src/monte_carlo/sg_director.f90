@@ -130,8 +130,7 @@ contains
   end subroutine report
 
   !> Mean of the 99.5 % runout with its 95 % interval, in the study case that has come farthest,
-  !> over
-  !> its ids without a gap.
+  !> over its ids without a gap.
   function running_text(this) result(text)
     class(ensemble_director_t), intent(in) :: this
     character(len=:), allocatable :: text

@@ -1,6 +1,5 @@
 !> ensemble.h5: all results of a run, written whole from memory under a temporary name and put in
-!> the
-!> place of the old one, so that the file that is there can always be opened.
+!> the place of the old one, so that the file that is there can always be opened.
 module sg_ensemble
   use sg_errors, only: error_t
   use sg_hdf5_file, only: hdf5_file_t

@@ -2,11 +2,9 @@
 !> share.
 !>
 !> Per step, with L the velocity gradient: strain increment = sym(L) dt, rotation angle w = (L_yx -
-!> L_xy) dt/2.
-!> Stress is turned by the rotation in the Cayley (midpoint) form, tan(theta) = w for half the
-!> angle of
-!> the stress deviator, orthogonal to rounding (Hughes & Winget 1980), and then takes the elastic
-!> increment.
+!> L_xy) dt/2. Stress is turned by the rotation in the Cayley (midpoint) form, tan(theta) = w for
+!> half the angle of the stress deviator, orthogonal to rounding (Hughes & Winget 1980), and then
+!> takes the elastic increment.
 module sg_linear_elastic
   use sg_kinds, only: wp
   use sg_weighting, only: BLOCK
@@ -16,8 +14,7 @@ module sg_linear_elastic
   public :: strain_t, find_strain, update_volume, predict_stress, stress_power
 
   !> Strain increments of up to BLOCK points; exy is the tensor component, `share` the part of the
-  !> increment that
-  !> strains the material (below 1 only for a point that first has a gap to close).
+  !> increment that strains the material (below 1 only for a point that first has a gap to close).
   type :: strain_t
     real(wp) :: exx(BLOCK), eyy(BLOCK), exy(BLOCK), spin(BLOCK), share(BLOCK)
   end type strain_t

@@ -8,15 +8,13 @@
 !>   flow     g = (s1 - s3) + (s1 + s3) sin(psi) on the cone, associated on the cut-off
 !>   return   s = s_trial - sum_k lambda_k D dg_k/ds over the active planes, lambda_k >= 0 (Koiter)
 !> Planes are linear in principal stress, so each set of active planes is a small linear system and
-!> the return is
-!> exact: plane, two edges (s2 = s3 and s1 = s2), the cut-off with its edges and corners, the apex
-!> s1 = s2 = s3 = T.
+!> the return is exact: plane, two edges (s2 = s3 and s1 = s2), the cut-off with its edges and
+!> corners, the apex s1 = s2 = s3 = T.
 !>
 !> Gap: at the apex the volumetric strain that makes no stress is kept as `gap` >= 0. While it is
-!> open the point
-!> stays at the apex; compression closes the gap first, and only the rest of the increment builds
-!> stress. Without
-!> it a grain that flew off would come back with several times its volume and full stiffness.
+!> open the point stays at the apex; compression closes the gap first, and only the rest of the
+!> increment builds stress. Without it a grain that flew off would come back with several times its
+!> volume and full stiffness.
 module sg_mohr_coulomb
   use sg_kinds, only: wp
   use sg_linear_elastic, only: strain_t
@@ -55,8 +53,7 @@ module sg_mohr_coulomb
   real(wp), parameter :: LEAST_RADIUS = 1.0e-100_wp
 
   !> Trial stresses of a block: principal ones in the plane (a >= b) and out of it (z); radius of
-  !> Mohr's circle and
-  !> the two components that give its direction.
+  !> Mohr's circle and the two components that give its direction.
   type :: principal_t
     real(wp) :: a(BLOCK), b(BLOCK), z(BLOCK), radius(BLOCK), half_difference(BLOCK), &
       shear_stress(BLOCK)
@@ -65,8 +62,7 @@ module sg_mohr_coulomb
 contains
 
   !> Opens or closes the gap with the volumetric strain increment; `strain%share` becomes the part
-  !> of the increment
-  !> that is left to strain the material.
+  !> of the increment that is left to strain the material.
   pure subroutine close_gap(n, strain, gap)
     integer, intent(in) :: n
     type(strain_t), intent(inout) :: strain
@@ -148,10 +144,9 @@ contains
     end do
   end subroutine return_stress
 
-  !> Point `p` of the block, whose return is not to the plane: sorts its principal stresses,
-  !> returns them, and turns
-  !> them back to `stress` = (xx, yy, zz, xy). `opening`: volumetric strain that the apex left
-  !> without stress.
+  !> Point `p` of the block, whose return is not to the plane: sorts its principal stresses, returns
+  !> them, and turns them back to `stress` = (xx, yy, zz, xy). `opening`: volumetric strain that the
+  !> apex left without stress.
   pure subroutine return_special(material, strength, trial, p, stress, opening)
     type(material_t), intent(in) :: material
     !> sin(phi), 2 c cos(phi), T
@@ -184,10 +179,9 @@ contains
     end associate
   end subroutine return_special
 
-  !> Exact return of sorted principal trial stresses `trial` (s1 >= s2 >= s3, Pa) to `returned`;
-  !> the head of the
-  !> module has the equations. `strength` = sin(phi), 2 c cos(phi) in Pa, T in Pa. `region`: a
-  !> REGION_ constant.
+  !> Exact return of sorted principal trial stresses `trial` (s1 >= s2 >= s3, Pa) to `returned`; the
+  !> head of the module has the equations. `strength` = sin(phi), 2 c cos(phi) in Pa, T in Pa.
+  !> `region`: a REGION_ constant.
   pure subroutine return_principal(material, strength, trial, returned, region)
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: strength(3), trial(3)
@@ -282,8 +276,7 @@ contains
   end subroutine define_planes
 
   !> Solves the leading `count` by `count` system in place by Gaussian elimination with pivoting; a
-  !> singular one
-  !> gives what is not finite, which the caller refuses.
+  !> singular one gives what is not finite, which the caller refuses.
   pure subroutine solve_small(count, matrix, vector)
     integer, intent(in) :: count
     real(wp), intent(inout) :: matrix(3, 3), vector(3)
