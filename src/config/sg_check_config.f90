@@ -52,6 +52,9 @@ contains
     do i = 1, size(config%bodies)
       call check_body(desk, i)
     end do
+    do i = 1, size(config%boundaries)
+      call check_boundary(desk, i)
+    end do
     call check_loading(desk)
     call check_solver(desk)
     if (config%has_random_field) call check_random_field(desk)
@@ -157,8 +160,34 @@ contains
       end if
       if (material%model == 'mohr_coulomb' .and. desk%good('material', i, &
         'friction_angle cohesion tension_strength')) call check_apex(desk, i)
+      if (material%softening == 'linear') call check_softening(desk, i)
     end associate
   end subroutine check_material
+
+  !> Softening ends after it starts and takes strength away.
+  subroutine check_softening(desk, i)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+
+    associate (material => desk%config%materials(i))
+      if (desk%good('material', i, 'softening_start softening_end')) then
+        if (.not. material%softening_end > material%softening_start) call desk%fault('material', &
+          i, 'softening_end', to_text(material%softening_end)//' is not above '// &
+          'softening_start = '//to_text(material%softening_start))
+      end if
+      if (desk%good('material', i, 'friction_angle residual_friction_angle')) then
+        if (material%residual_friction_angle > material%friction_angle) call desk%fault( &
+          'material', i, 'residual_friction_angle', to_text(material%residual_friction_angle)// &
+          ' exceeds friction_angle = '//to_text(material%friction_angle)// &
+          ' (allowed: up to friction_angle)')
+      end if
+      if (desk%good('material', i, 'cohesion residual_cohesion')) then
+        if (material%residual_cohesion > material%cohesion) call desk%fault('material', i, &
+          'residual_cohesion', to_text(material%residual_cohesion)//' exceeds cohesion = '// &
+          to_text(material%cohesion)//' (allowed: up to cohesion)')
+      end if
+    end associate
+  end subroutine check_softening
 
   !> The tensile strength of a Mohr-Coulomb material ends at the apex of its pyramid.
   subroutine check_apex(desk, i)
@@ -306,6 +335,44 @@ contains
     end if
     call check_inside(desk, i, 'vertices', minval(corners, dim=2), maxval(corners, dim=2))
   end subroutine check_polygon
+
+  !> The box is no inside-out one and holds nodes of the grid.
+  subroutine check_boundary(desk, i)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+
+    associate (boundary => desk%config%boundaries(i))
+      call check_side(desk, i, 'x_min', 'x_max', boundary%x_min, boundary%x_max)
+      call check_side(desk, i, 'y_min', 'y_max', boundary%y_min, boundary%y_max)
+    end associate
+  end subroutine check_boundary
+
+  subroutine check_side(desk, i, low_key, high_key, low, high)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: i
+    character(len=*), intent(in) :: low_key, high_key
+    real(wp), intent(in) :: low, high
+    real(wp) :: grid_low, grid_high, first
+
+    if (.not. desk%good('boundary', i, low_key//' '//high_key)) return
+    if (high < low) then
+      call desk%fault('boundary', i, high_key, to_text(high)//' is below '//low_key//' = '// &
+        to_text(low))
+      return
+    end if
+    if (.not. desk%good('grid', 1, low_key//' '//high_key//' cell_size')) return
+    associate (grid => desk%config%grid)
+      grid_low = merge(grid%x_min, grid%y_min, low_key == 'x_min')
+      grid_high = merge(grid%x_max, grid%y_max, low_key == 'x_min')
+      first = grid_low + grid%cell_size*ceiling((low - grid_low)/grid%cell_size - EDGE_TOLERANCE)
+      if (first > high + EDGE_TOLERANCE*grid%cell_size .or. high < grid_low - EDGE_TOLERANCE* &
+        grid%cell_size .or. low > grid_high + EDGE_TOLERANCE*grid%cell_size) then
+        call desk%fault('boundary', i, low_key, 'there is no node from '//to_text(low)//' to '// &
+          to_text(high)//' (nodes lie at '//to_text(grid_low)//', '// &
+          to_text(grid_low + grid%cell_size)//', ... '//to_text(grid_high)//')')
+      end if
+    end associate
+  end subroutine check_side
 
   subroutine check_loading(desk)
     type(desk_t), intent(inout) :: desk

@@ -241,9 +241,6 @@ contains
     reason = ''
     if (len_trim(key%needs) > 0 .and. nml%count(key%needs) == 0) then
       reason = 'it makes sense only with &'//trim(key%needs)//', which is not given'
-    else if (len_trim(key%unless) > 0) then
-      if (group%find(key%unless) > 0) reason = trim(key%unless)//' is given, which replaces it '// &
-        '(give one of the two)'
     else if (len_trim(key%when) > 0) then
       decider = KEYS(key_row(key%group, key%when))
       e = group%find(key%when)

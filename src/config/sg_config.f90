@@ -6,7 +6,8 @@ module sg_config
   implicit none
   private
 
-  public :: config_t, grid_config_t, material_config_t, body_config_t, loading_config_t
+  public :: config_t, grid_config_t, material_config_t, body_config_t, boundary_config_t
+  public :: loading_config_t
   public :: solver_config_t, random_field_config_t, monte_carlo_config_t, study_config_t
   public :: output_config_t
   public :: NAME_LENGTH
@@ -18,12 +19,20 @@ module sg_config
     real(wp) :: x_min, x_max, y_min, y_max
     real(wp) :: cell_size
     character(len=NAME_LENGTH) :: left, right, bottom, top
+    !> Coulomb friction of the walls that are frictional.
+    real(wp) :: left_friction, right_friction, bottom_friction, top_friction
   end type grid_config_t
 
   type :: material_config_t
     character(len=NAME_LENGTH) :: name, model
     real(wp) :: density, young, poisson
     real(wp) :: friction_angle, dilation_angle, cohesion, tension_strength
+    character(len=NAME_LENGTH) :: cone, softening
+    real(wp) :: undrained_strength
+    !> Strength left after softening, between these equivalent plastic strains.
+    real(wp) :: residual_friction_angle, residual_cohesion, softening_start, softening_end
+    !> Equivalent plastic strain at which dilation has faded to nothing; 0: never.
+    real(wp) :: dilation_end
   end type material_config_t
 
   type :: body_config_t
@@ -38,16 +47,33 @@ module sg_config
     !> Per direction.
     integer :: points_per_cell
     real(wp) :: velocity(2)
+    !> About the centre of the body's box, 1/s.
+    real(wp) :: angular_velocity
+    !> File of the points of shape 'points'; empty for other shapes.
+    character(len=:), allocatable :: file
   end type body_config_t
+
+  !> Nodes in a box whose velocity is prescribed.
+  type :: boundary_config_t
+    character(len=NAME_LENGTH) :: name, components
+    real(wp) :: x_min, x_max, y_min, y_max
+    real(wp) :: velocity(2)
+  end type boundary_config_t
 
   type :: loading_config_t
     real(wp) :: gravity(2)
     real(wp) :: damping
     character(len=NAME_LENGTH) :: initial_stress
+    !> How the body is brought to rest before time 0, for at most so many seconds.
+    character(len=NAME_LENGTH) :: relaxation
+    real(wp) :: relaxation_time
+    !> Body force beside gravity, and the amplitude of the manufactured solution in m.
+    character(len=NAME_LENGTH) :: body_force
+    real(wp) :: amplitude
   end type loading_config_t
 
   type :: solver_config_t
-    character(len=NAME_LENGTH) :: weighting, scheme
+    character(len=NAME_LENGTH) :: weighting, scheme, anti_locking
     real(wp) :: flip
     real(wp) :: cfl
     !> Fixed time step in s, or 0: from the CFL number.
@@ -99,6 +125,7 @@ module sg_config
     type(grid_config_t) :: grid
     type(material_config_t), allocatable :: materials(:)
     type(body_config_t), allocatable :: bodies(:)
+    type(boundary_config_t), allocatable :: boundaries(:)
     type(loading_config_t) :: loading
     type(solver_config_t) :: solver
     !> False: no &random_field group, the run is deterministic and `random_field` holds nothing of

@@ -128,10 +128,17 @@ contains
     do i = 1, size(config%bodies)
       call visit_body(config, i, visitor)
     end do
+    do i = 1, size(config%boundaries)
+      call visit_boundary(config, i, visitor)
+    end do
     call visitor%begin_group('loading', 1)
     call visitor%visit_pair('gravity', config%loading%gravity)
     call visitor%visit('damping', config%loading%damping)
     call visitor%visit('initial_stress', config%loading%initial_stress)
+    call visitor%visit('relaxation', config%loading%relaxation)
+    call visitor%visit('relaxation_time', config%loading%relaxation_time)
+    call visitor%visit('body_force', config%loading%body_force)
+    call visitor%visit('amplitude', config%loading%amplitude)
     call visit_solver(config, visitor)
     if (config%has_random_field) call visit_random_field(config, visitor)
     call visit_monte_carlo(config, visitor)
@@ -157,6 +164,10 @@ contains
     call visitor%visit('right', config%grid%right)
     call visitor%visit('bottom', config%grid%bottom)
     call visitor%visit('top', config%grid%top)
+    call visitor%visit('left_friction', config%grid%left_friction)
+    call visitor%visit('right_friction', config%grid%right_friction)
+    call visitor%visit('bottom_friction', config%grid%bottom_friction)
+    call visitor%visit('top_friction', config%grid%top_friction)
   end subroutine visit_grid
 
   subroutine visit_material(config, i, visitor)
@@ -175,6 +186,14 @@ contains
       call visitor%visit('dilation_angle', material%dilation_angle)
       call visitor%visit('cohesion', material%cohesion)
       call visitor%visit('tension_strength', material%tension_strength)
+      call visitor%visit('cone', material%cone)
+      call visitor%visit('undrained_strength', material%undrained_strength)
+      call visitor%visit('softening', material%softening)
+      call visitor%visit('residual_friction_angle', material%residual_friction_angle)
+      call visitor%visit('residual_cohesion', material%residual_cohesion)
+      call visitor%visit('softening_start', material%softening_start)
+      call visitor%visit('softening_end', material%softening_end)
+      call visitor%visit('dilation_end', material%dilation_end)
     end associate
   end subroutine visit_material
 
@@ -196,8 +215,27 @@ contains
       call visitor%visit_list('vertices', body%vertices)
       call visitor%visit('points_per_cell', body%points_per_cell)
       call visitor%visit_pair('velocity', body%velocity)
+      call visitor%visit('angular_velocity', body%angular_velocity)
+      call visitor%visit_text('file', body%file)
     end associate
   end subroutine visit_body
+
+  subroutine visit_boundary(config, i, visitor)
+    type(config_t), intent(inout) :: config
+    integer, intent(in) :: i
+    class(config_visitor_t), intent(inout) :: visitor
+
+    associate (boundary => config%boundaries(i))
+      call visitor%begin_group('boundary', i)
+      call visitor%visit('name', boundary%name)
+      call visitor%visit('x_min', boundary%x_min)
+      call visitor%visit('x_max', boundary%x_max)
+      call visitor%visit('y_min', boundary%y_min)
+      call visitor%visit('y_max', boundary%y_max)
+      call visitor%visit('components', boundary%components)
+      call visitor%visit_pair('velocity', boundary%velocity)
+    end associate
+  end subroutine visit_boundary
 
   subroutine visit_solver(config, visitor)
     type(config_t), intent(inout) :: config
@@ -207,6 +245,7 @@ contains
     call visitor%visit('weighting', config%solver%weighting)
     call visitor%visit('scheme', config%solver%scheme)
     call visitor%visit('flip', config%solver%flip)
+    call visitor%visit('anti_locking', config%solver%anti_locking)
     call visitor%visit('time_step', config%solver%time_step)
     call visitor%visit('cfl', config%solver%cfl)
     call visitor%visit('end_time', config%solver%end_time)

@@ -68,7 +68,7 @@ contains
   function key_lines(key) result(text)
     type(key_t), intent(in) :: key
     character(len=:), allocatable :: text
-    character(len=22) :: name
+    character(len=26) :: name
 
     name = key%name
     text = '  '//name//type_text(key)
@@ -84,11 +84,10 @@ contains
       text = text//' ('//trim(key%default_deterministic)//' without &random_field)'
     end if
     if (key%when /= '') text = text//'; only for '//trim(key%when)//': '//trim(key%when_is)
-    if (key%unless /= '') text = text//'; not beside '//trim(key%unless)
     if (key%needs /= '') text = text//'; only with &'//trim(key%needs)
-    text = text//BREAK//repeat(' ', 24)//trim(key%meaning)//BREAK
+    text = text//BREAK//repeat(' ', 28)//trim(key%meaning)//BREAK
     if (key%later /= '') text = text//repeat(' ', &
-      24)//'(not in this version yet: '//trim(key%later)//')'//BREAK
+      28)//'(not in this version yet: '//trim(key%later)//')'//BREAK
   end function key_lines
 
   pure function type_text(key) result(text)
@@ -151,6 +150,7 @@ contains
       'where it has one,'//BREAK// &
       '! else with the value of the paper. sgimp --keys tells which may be left out.'//BREAK
     do g = 1, size(GROUPS)
+      if (.not. GROUPS(g)%in_example) cycle
       text = text//BREAK//'! '//trim(GROUPS(g)%meaning)//BREAK//'&'//trim(GROUPS(g)%name)//BREAK
       do k = 1, size(KEYS)
         if (KEYS(k)%group /= GROUPS(g)%name) cycle
@@ -164,8 +164,8 @@ contains
     end do
   end function print_defaults
 
-  !> Keys of another model, shape or wall, and the fixed step beside the CFL number, stay out of
-  !> the example.
+  !> Keys of another model, shape or wall, and those that have neither default nor example, stay
+  !> out of the example.
   pure function belongs_to_example(key) result(belongs)
     type(key_t), intent(in) :: key
     logical :: belongs
@@ -179,9 +179,6 @@ contains
           1))//' ') > 0
       end do
     end if
-    do k = 1, size(KEYS)
-      if (KEYS(k)%group == key%group .and. KEYS(k)%unless == key%name) belongs = .false.
-    end do
     if (first_value(key) == '' .and. key%kind /= KIND_TEXT) belongs = .false.
   end function belongs_to_example
 

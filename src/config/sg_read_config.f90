@@ -11,6 +11,7 @@ module sg_read_config
   use sg_kinds, only: i8, wp
   use sg_namelist, only: namelist_t, nml_value_t
   use sg_number_text, only: parse_integer, parse_real
+  use sg_posix, only: working_directory
   use sg_scan, only: scan_namelist
   use sg_schema, only: count_words, key_row, KEYS, KIND_WORD, word_at
   use sg_text, only: lower_case
@@ -67,21 +68,25 @@ contains
     reader%is_deterministic = .not. config%has_random_field
     allocate (config%materials(reader%nml%count('material')))
     allocate (config%bodies(reader%nml%count('body')))
+    allocate (config%boundaries(reader%nml%count('boundary')))
     call visit_config(config, reader)
-    call complete(config)
+    call complete(config, file_name)
 
     call check_config(config, reader%nml, faults)
     if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
   end subroutine read_config
 
   !> Values that follow from others.
-  subroutine complete(config)
+  subroutine complete(config, file_name)
     type(config_t), intent(inout) :: config
+    character(len=*), intent(in) :: file_name
     character(len=*), parameter :: NAME_MARK = '<name>'
     integer :: i, mark
 
     do i = 1, size(config%bodies)
       config%bodies(i)%material_index = index_of_material(config, config%bodies(i)%material)
+      if (config%bodies(i)%file /= '') config%bodies(i)%file = &
+        path_beside(file_name, config%bodies(i)%file)
     end do
     mark = index(config%output%directory, NAME_MARK)
     if (mark > 0) config%output%directory = config%output%directory(:mark - 1)// &
@@ -107,6 +112,17 @@ contains
       config%random_field%cov = config%study%cov(1)
     end if
   end subroutine complete
+
+  !> `path` as it counts from the directory of `file_name`, made absolute so that resolved.nml can
+  !> stand elsewhere.
+  function path_beside(file_name, path) result(absolute)
+    character(len=*), intent(in) :: file_name, path
+    character(len=:), allocatable :: absolute
+
+    absolute = file_name(:index(file_name, '/', back=.true.))//path
+    if (path(1:1) == '/') absolute = path
+    if (absolute(1:1) /= '/') absolute = working_directory()//'/'//absolute
+  end function path_beside
 
   pure integer function index_of_material(config, name) result(i)
     type(config_t), intent(in) :: config

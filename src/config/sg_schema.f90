@@ -32,11 +32,13 @@ module sg_schema
     logical :: repeatable = .false.
     !> Group without which this one makes no sense.
     character(len=16) :: needs = ''
+    !> Shown by `--defaults`.
+    logical :: in_example = .true.
   end type group_t
 
   type :: key_t
     character(len=16) :: group
-    character(len=20) :: name
+    character(len=24) :: name
     integer :: kind
     character(len=8) :: unit = ''
     !> Value of a key that is not given, as in a case file but without quotes; lists with blanks.
@@ -48,7 +50,7 @@ module sg_schema
     !> Interval of numbers: '[' and ']' include the bound, '(' and ')' exclude it; a missing bound
     !> is no bound.
     character(len=24) :: range = '(,)'
-    character(len=64) :: choices = ''
+    character(len=80) :: choices = ''
     character(len=96) :: later = ''
     !> Number of values, or ANY_NUMBER.
     integer :: size = 1
@@ -57,8 +59,6 @@ module sg_schema
     !> Applies only where key `when` of the same group has one of the words `when_is`.
     character(len=16) :: when = ''
     character(len=64) :: when_is = ''
-    !> Does not apply where this key of the same group is given.
-    character(len=16) :: unless = ''
     !> Group without which the key makes no sense.
     character(len=16) :: needs = ''
     !> Not required where this group gives the key of the same name.
@@ -74,6 +74,8 @@ module sg_schema
     group_t('material', 'A material; one group for each', required=.true., repeatable=.true.), &
     group_t('body', 'A body filled with material points; one group for each', &
     required=.true., repeatable=.true.), &
+    group_t('boundary', 'Prescribed velocity of the nodes in a box; one group for each', &
+    repeatable=.true., in_example=.false.), &
     group_t('loading', 'Gravity, damping and the stress at the start'), &
     group_t('solver', 'Discretisation in space and time', required=.true.), &
     group_t('random_field', 'Random field of a material property; without this group the run '// &
@@ -88,9 +90,9 @@ module sg_schema
     identity=.false., meaning='Short name of the run'), &
     key_t('case', 'title', KIND_TEXT, identity=.false., meaning='One line for the report')]
 
-  character(len=*), parameter :: WALLS = 'fixed roller free'
+  character(len=*), parameter :: WALLS = 'fixed roller free frictional'
   character(len=*), parameter :: WALL_MEANING = 'fixed: nothing moves; roller: free to slide '// &
-    'along it; free: no condition; frictional: Coulomb friction'
+    'along it; free: no condition; frictional: Coulomb friction with stick, may lift off'
   character(len=*), parameter :: FRICTION_MEANING = 'Coulomb friction coefficient of this wall'
 
   type(key_t), parameter :: GRID_KEYS(*) = [ &
@@ -102,13 +104,13 @@ module sg_schema
     meaning='Upper edge, a whole number of cells from y_min'), &
     key_t('grid', 'cell_size', KIND_REAL, unit='m', example='0.125', range='(0,)', &
     required=.true., meaning='Side of a cell'), &
-    key_t('grid', 'left', KIND_WORD, default='roller', choices=WALLS, later='frictional', &
+    key_t('grid', 'left', KIND_WORD, default='roller', choices=WALLS, &
     meaning='Wall at x_min. '//WALL_MEANING), &
-    key_t('grid', 'right', KIND_WORD, default='roller', choices=WALLS, later='frictional', &
+    key_t('grid', 'right', KIND_WORD, default='roller', choices=WALLS, &
     meaning='Wall at x_max'), &
-    key_t('grid', 'bottom', KIND_WORD, default='fixed', choices=WALLS, later='frictional', &
+    key_t('grid', 'bottom', KIND_WORD, default='fixed', choices=WALLS, &
     meaning='Wall at y_min'), &
-    key_t('grid', 'top', KIND_WORD, default='free', choices=WALLS, later='frictional', &
+    key_t('grid', 'top', KIND_WORD, default='free', choices=WALLS, &
     meaning='Wall at y_max'), &
     key_t('grid', 'left_friction', KIND_REAL, range='[0,)', example='0.5', required=.true., &
     when='left', when_is='frictional', meaning=FRICTION_MEANING), &
@@ -125,7 +127,7 @@ module sg_schema
     key_t('material', 'name', KIND_NAME, example='sand', required=.true., &
     meaning='Name that bodies and the random field refer to'), &
     key_t('material', 'model', KIND_WORD, example='mohr_coulomb', required=.true., &
-    choices='linear_elastic mohr_coulomb', later='neo_hookean drucker_prager von_mises', &
+    choices='linear_elastic neo_hookean mohr_coulomb drucker_prager von_mises tresca', &
     meaning='Constitutive model'), &
     key_t('material', 'density', KIND_REAL, unit='kg/m^3', example='1450', range='(0,)', &
     required=.true., meaning='Density at the start'), &
@@ -143,17 +145,52 @@ module sg_schema
     key_t('material', 'tension_strength', KIND_REAL, unit='Pa', default='0', range='[0,)', &
     when='model', when_is=FRICTIONAL_MODELS, meaning='Cut-off of tensile stress'), &
     key_t('material', 'cone', KIND_WORD, default='plane_strain', &
-    choices='plane_strain outer inner', when='model', when_is='drucker_prager', &
-    meaning='How the cone is fitted to the Mohr-Coulomb pyramid'), &
+    choices='plane_strain plane_strain_associated outer inner equal_area', when='model', &
+    when_is='drucker_prager', meaning='How the cone is fitted to the Mohr-Coulomb pyramid: in '// &
+    'plane strain with its dilation, or with psi = phi; at triaxial compression or extension'), &
     key_t('material', 'undrained_strength', KIND_REAL, unit='Pa', example='1e3', range='(0,)', &
-    required=.true., when='model', when_is='von_mises', meaning='Undrained shear strength')]
+    required=.true., when='model', when_is='von_mises tresca', &
+    meaning='Undrained shear strength'), &
+    key_t('material', 'softening', KIND_WORD, default='none', choices='none linear', &
+    when='model', when_is='mohr_coulomb', &
+    meaning='How strength falls with equivalent plastic strain'), &
+    key_t('material', 'residual_friction_angle', KIND_REAL, unit='deg', example='30', &
+    range='[0,90)', required=.true., when='softening', when_is='linear', &
+    meaning='Angle of internal friction after softening; points that start lower keep theirs'), &
+    key_t('material', 'residual_cohesion', KIND_REAL, unit='Pa', default='0', range='[0,)', &
+    when='softening', when_is='linear', meaning='Cohesion after softening'), &
+    key_t('material', 'softening_start', KIND_REAL, unit='1', default='0', range='[0,)', &
+    when='softening', when_is='linear', &
+    meaning='Equivalent plastic strain sqrt(2/3 e:e) at which softening begins'), &
+    key_t('material', 'softening_end', KIND_REAL, unit='1', example='0.1', range='(0,)', &
+    required=.true., when='softening', when_is='linear', &
+    meaning='Equivalent plastic strain at which only the residual strength is left'), &
+    key_t('material', 'dilation_end', KIND_REAL, unit='1', default='0', range='[0,)', &
+    when='model', when_is='mohr_coulomb', &
+    meaning='Equivalent plastic strain at which the dilation angle has faded to 0; 0: never')]
+
+  type(key_t), parameter :: BOUNDARY_KEYS(*) = [ &
+    key_t('boundary', 'name', KIND_NAME, example='footing', required=.true., meaning='Name'), &
+    key_t('boundary', 'x_min', KIND_REAL, unit='m', example='0', required=.true., &
+    meaning='Left edge of the box of nodes'), &
+    key_t('boundary', 'x_max', KIND_REAL, unit='m', example='1', required=.true., &
+    meaning='Right edge, at least x_min'), &
+    key_t('boundary', 'y_min', KIND_REAL, unit='m', example='5', required=.true., &
+    meaning='Lower edge'), &
+    key_t('boundary', 'y_max', KIND_REAL, unit='m', example='5.25', required=.true., &
+    meaning='Upper edge, at least y_min'), &
+    key_t('boundary', 'components', KIND_WORD, default='both', choices='both x y', &
+    meaning='Components of the velocity that are prescribed'), &
+    key_t('boundary', 'velocity', KIND_REAL, unit='m/s', default='0 0', size=2, &
+    meaning='Prescribed velocity: x, y')]
+
 
   type(key_t), parameter :: BODY_KEYS(*) = [ &
     key_t('body', 'name', KIND_NAME, example='column', required=.true., meaning='Name'), &
     key_t('body', 'material', KIND_NAME, example='sand', required=.true., &
     meaning='Name of its material'), &
     key_t('body', 'shape', KIND_WORD, example='rectangle', required=.true., &
-    choices='rectangle disc polygon', later='points', meaning='Shape at the start'), &
+    choices='rectangle disc polygon points', meaning='Shape at the start'), &
     key_t('body', 'x', KIND_REAL, unit='m', example='0', required=.true., when='shape', &
     when_is='rectangle disc', meaning='Left edge of a rectangle, centre of a disc'), &
     key_t('body', 'y', KIND_REAL, unit='m', example='0', required=.true., when='shape', &
@@ -168,11 +205,14 @@ module sg_schema
     required=.true., when='shape', when_is='polygon', &
     meaning='Corners x1, y1, x2, y2, ... in order, clockwise or not'), &
     key_t('body', 'file', KIND_TEXT, example='points.csv', required=.true., when='shape', &
-    when_is='points', meaning='CSV file of material points'), &
+    when_is='points', meaning='CSV file of material points, first line x,y,width,height or '// &
+    'x,y,width,height,vx,vy; its path counts from the directory of the case file'), &
     key_t('body', 'points_per_cell', KIND_INTEGER, default='2', range='[1,10]', when='shape', &
     when_is='rectangle disc polygon', meaning='Material points in a cell, along each direction'), &
     key_t('body', 'velocity', KIND_REAL, unit='m/s', default='0 0', size=2, &
-    meaning='Velocity at the start: x, y')]
+    meaning='Velocity at the start: x, y'), &
+    key_t('body', 'angular_velocity', KIND_REAL, unit='1/s', default='0', &
+    meaning='Spin at the start about the centre of the box around the body')]
 
   type(key_t), parameter :: LOADING_KEYS(*) = [ &
     key_t('loading', 'gravity', KIND_REAL, unit='m/s^2', default='0 -9.81', size=2, &
@@ -181,19 +221,34 @@ module sg_schema
     meaning='Coefficient c_d of the force -c_d m v on the nodes (Eq. 14 of the paper)'), &
     key_t('loading', 'initial_stress', KIND_WORD, default='none', choices='none geostatic', &
     meaning='none: gravity is switched on; geostatic: in balance with gravity, within the '// &
-    'yield surface')]
+    'yield surface'), &
+    key_t('loading', 'relaxation', KIND_WORD, default='none', choices='none open gated', &
+    meaning='Damped stage before time 0 that lets gravity act: gated holds the body by a '// &
+    'roller at its toe, open does not'), &
+    key_t('loading', 'relaxation_time', KIND_REAL, unit='s', example='2', range='(0,)', &
+    required=.true., when='relaxation', when_is='open gated', &
+    meaning='Longest time of that stage; it ends earlier at rest'), &
+    key_t('loading', 'body_force', KIND_WORD, default='none', choices='none manufactured', &
+    meaning='manufactured: force and first velocity of the manufactured solution on the unit '// &
+    'square (verification)'), &
+    key_t('loading', 'amplitude', KIND_REAL, unit='m', example='1e-4', range='(0,0.3]', &
+    required=.true., when='body_force', when_is='manufactured', &
+    meaning='Amplitude of the manufactured solution')]
 
   type(key_t), parameter :: SOLVER_KEYS(*) = [ &
-    key_t('solver', 'weighting', KIND_WORD, default='gimp', choices='linear gimp', &
-    later='cpgimp bspline', meaning='Weighting function of a point; gimp is uGIMP'), &
+    key_t('solver', 'weighting', KIND_WORD, default='gimp', &
+    choices='linear gimp cpgimp bspline', meaning='Weighting function of a point: gimp is '// &
+    'uGIMP, in cpgimp its domain follows its stretch, bspline is quadratic'), &
     key_t('solver', 'scheme', KIND_WORD, default='musl', choices='usf usl musl', &
     meaning='When stress is updated: first, last, or last with momentum mapped anew'), &
     key_t('solver', 'flip', KIND_REAL, unit='1', default='1', range='[0,1]', &
     meaning='Share of FLIP in the velocity update; the rest is PIC'), &
-    key_t('solver', 'time_step', KIND_REAL, unit='s', example='1e-3', range='(0,)', &
-    meaning='Fixed time step; without it the step follows from cfl'), &
+    key_t('solver', 'anti_locking', KIND_WORD, default='none', choices='none cell_average', &
+    meaning='Volumetric strain of a point: its own, or the mean of its cell (nearly '// &
+    'incompressible behaviour)'), &
+    key_t('solver', 'time_step', KIND_REAL, unit='s', range='(0,)', &
+    meaning='Fixed time step; overrides cfl'), &
     key_t('solver', 'cfl', KIND_REAL, unit='1', default='0.4', range='(0,1.5]', &
-    unless='time_step', &
     meaning='Time step as a share of the time that a wave or a point needs to cross a cell'), &
     key_t('solver', 'end_time', KIND_REAL, unit='s', example='5', range='(0,)', required=.true., &
     meaning='Time at which a run ends, at the latest'), &
@@ -269,7 +324,7 @@ module sg_schema
     identity=.false., meaning='Wall clock time between two progress lines')]
 
   type(key_t), parameter :: KEYS(*) = [CASE_KEYS, GRID_KEYS, MATERIAL_KEYS, BODY_KEYS, &
-    LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, MONTE_CARLO_KEYS, STUDY_KEYS, OUTPUT_KEYS]
+    BOUNDARY_KEYS, LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, MONTE_CARLO_KEYS, STUDY_KEYS, OUTPUT_KEYS]
 
 contains
 

@@ -13,7 +13,7 @@ module sg_posix
   public :: end_program
   public :: file_exists, read_file, read_text, replace_file, write_file, make_directory
   public :: remove_file, remove_files
-  public :: host_name, utc_time, sleep_seconds, checksum, hash_text
+  public :: host_name, utc_time, working_directory, sleep_seconds, checksum, hash_text
 
   !> A file to which bytes are added for good: `append` returns when they are on disk.
   type :: append_file_t
@@ -142,6 +142,13 @@ module sg_posix
       character(kind=c_char), intent(out) :: text(*)
       integer(c_int), value :: capacity
     end subroutine sg_host_name
+
+    subroutine sg_working_directory(text, capacity) bind(c)
+      import :: c_char, c_int
+      implicit none
+      character(kind=c_char), intent(out) :: text(*)
+      integer(c_int), value :: capacity
+    end subroutine sg_working_directory
 
     subroutine sg_utc_time(text, capacity) bind(c)
       import :: c_char, c_int
@@ -348,6 +355,15 @@ contains
     call sg_host_name(buffer, size(buffer))
     name = fortran_text(buffer)
   end function host_name
+
+  !> Absolute path of the directory in which the program was started, `.` if nobody knows.
+  function working_directory() result(path)
+    character(len=:), allocatable :: path
+    character(kind=c_char, len=1) :: buffer(4096)
+
+    call sg_working_directory(buffer, size(buffer))
+    path = fortran_text(buffer)
+  end function working_directory
 
   !> Now, like 2026-01-31T12:00:00Z.
   function utc_time() result(text)

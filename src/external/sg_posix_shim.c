@@ -207,6 +207,12 @@ void sg_host_name(char *text, int capacity)
   text[capacity - 1] = '\0';
 }
 
+void sg_working_directory(char *text, int capacity)
+{
+  if (getcwd(text, (size_t)capacity) == NULL)
+    snprintf(text, (size_t)capacity, ".");
+}
+
 void sg_utc_time(char *text, int capacity)
 {
   time_t now = time(NULL);

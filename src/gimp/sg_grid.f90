@@ -5,13 +5,16 @@
 !> are touched. Whoever reads the sums last clears them, so that they are zero when points are next
 !> mapped.
 module sg_grid
-  use sg_config, only: grid_config_t
+  use sg_boundary, only: apply_conditions, condition_t, create_prescribed, create_wall, &
+    hold_conditions
+  use sg_config, only: boundary_config_t, grid_config_t
   use sg_kinds, only: wp
   use sg_memory, only: aligned_start, ALIGNMENT_SLACK
+  use sg_weighting, only: axis_t, NO_WALL
   implicit none
   private
 
-  public :: grid_t, tally_t
+  public :: grid_t, losses_t, tally_t
 
   !> Layers of nodes outside each wall.
   integer, parameter :: GHOST = 2
@@ -19,10 +22,6 @@ module sg_grid
   !> accurate however small both are; a weight S below this means that the point reaches the node by
   !> less than the rounding of its position.
   real(wp), parameter :: EMPTY_NODE = 1.0e-30_wp
-
-  integer, parameter :: WALL_FREE = 0
-  integer, parameter :: WALL_ROLLER = 1
-  integer, parameter :: WALL_FIXED = 2
 
   !> What a pass over the points finds out about them.
   type :: tally_t
@@ -39,15 +38,17 @@ module sg_grid
     procedure :: reset => reset_tally
   end type tally_t
 
+  !> Energy that left the nodes in a step, J/m.
+  type :: losses_t
+    !> To the damping force, and to walls and prescribed velocities (negative: they put some in).
+    real(wp) :: damping = 0.0_wp, walls = 0.0_wp
+  end type losses_t
+
   type :: grid_t
-    real(wp) :: cell_size, inverse_cell
-    !> Position of node (0, 0) in m.
-    real(wp) :: x_origin, y_origin
-    !> Last node in each direction, and the largest first node of a stencil of three.
-    integer :: nx, ny, last_base_x, last_base_y
-    !> Nodes of the walls.
-    integer :: left_node, right_node, bottom_node, top_node
-    integer :: left, right, bottom, top
+    real(wp) :: cell_size
+    type(axis_t) :: x, y
+    !> The four walls, then the prescribed velocities, applied in this order.
+    type(condition_t), allocatable :: conditions(:)
     !> Mass below which a node counts as empty, kg/m.
     real(wp) :: least_mass
     !> Storage of the nodes. What counts begins at element `total_start` and `motion_start` on a
@@ -55,15 +56,15 @@ module sg_grid
     !> total_store(total_start).
     real(wp), allocatable :: total_store(:), motion_store(:)
     integer :: total_start, motion_start
-    !> Window of nodes that points can have touched.
-    integer :: i_first, i_last, j_first, j_last
+    !> Window of nodes that points can have touched: i_first, i_last, j_first, j_last.
+    integer :: window(4)
   contains
     procedure :: init => init_grid
     procedure :: set_window
     procedure :: integrate_momentum
     procedure :: find_velocity
     procedure :: remap_velocity
-    procedure, private :: hold_walls
+    procedure :: reaction
   end type grid_t
 
 contains
@@ -85,57 +86,58 @@ contains
   !> `stretch` scales the cells (and with them the far walls) about the lower left corner: 0 for
   !> none.
   !> `least_point_mass` is the mass of the lightest point, in kg/m.
-  subroutine init_grid(this, config, stretch, least_point_mass)
+  subroutine init_grid(this, config, boundaries, stretch, least_point_mass)
     class(grid_t), intent(out) :: this
     type(grid_config_t), intent(in) :: config
+    type(boundary_config_t), intent(in) :: boundaries(:)
     real(wp), intent(in) :: stretch, least_point_mass
-    integer :: cells_x, cells_y, nodes
+    integer :: nodes, k
 
-    cells_x = nint((config%x_max - config%x_min)/config%cell_size)
-    cells_y = nint((config%y_max - config%y_min)/config%cell_size)
     this%cell_size = config%cell_size*(1.0_wp + stretch)
-    this%inverse_cell = 1.0_wp/this%cell_size
-    this%x_origin = config%x_min - GHOST*this%cell_size
-    this%y_origin = config%y_min - GHOST*this%cell_size
-    this%nx = cells_x + 2*GHOST
-    this%ny = cells_y + 2*GHOST
-    this%last_base_x = this%nx - 2
-    this%last_base_y = this%ny - 2
-    this%left_node = GHOST
-    this%right_node = GHOST + cells_x
-    this%bottom_node = GHOST
-    this%top_node = GHOST + cells_y
-    this%left = wall_kind(config%left)
-    this%right = wall_kind(config%right)
-    this%bottom = wall_kind(config%bottom)
-    this%top = wall_kind(config%top)
+    this%x = create_axis(config%x_min, config%x_max, config%cell_size, this%cell_size, &
+      config%left, config%right)
+    this%y = create_axis(config%y_min, config%y_max, config%cell_size, this%cell_size, &
+      config%bottom, config%top)
+    associate (nx => this%x%last, ny => this%y%last)
+      allocate (this%conditions(4 + size(boundaries)))
+      this%conditions(1) = create_wall(config%left, config%left_friction, [0, GHOST, 0, ny], 1, &
+        1.0_wp)
+      this%conditions(2) = create_wall(config%right, config%right_friction, &
+        [nx - GHOST, nx, 0, ny], 1, -1.0_wp)
+      this%conditions(3) = create_wall(config%bottom, config%bottom_friction, [0, nx, 0, GHOST], &
+        2, 1.0_wp)
+      this%conditions(4) = create_wall(config%top, config%top_friction, [0, nx, ny - GHOST, ny], &
+        2, -1.0_wp)
+      do k = 1, size(boundaries)
+        this%conditions(4 + k) = create_prescribed(boundaries(k), [this%x%origin, &
+          this%y%origin], this%cell_size)
+      end do
+      this%window = [0, nx, 0, ny]
+      nodes = (nx + 1)*(ny + 1)
+    end associate
     this%least_mass = EMPTY_NODE*least_point_mass
-    nodes = (this%nx + 1)*(this%ny + 1)
     allocate (this%total_store(8*nodes + ALIGNMENT_SLACK), this%motion_store(4*nodes &
       + ALIGNMENT_SLACK))
     this%total_store = 0.0_wp
     this%motion_store = 0.0_wp
     this%total_start = aligned_start(this%total_store)
     this%motion_start = aligned_start(this%motion_store)
-    this%i_first = 0
-    this%i_last = this%nx
-    this%j_first = 0
-    this%j_last = this%ny
   end subroutine init_grid
 
-  pure function wall_kind(name) result(kind)
-    character(len=*), intent(in) :: name
-    integer :: kind
+  !> Nodes from `low` to `high` with the ghost layers. `nominal` is the cell of the case file, which
+  !> says how many there are, `cell` the one in use, both in m.
+  pure function create_axis(low, high, nominal, cell, first_wall, last_wall) result(axis)
+    real(wp), intent(in) :: low, high, nominal, cell
+    character(len=*), intent(in) :: first_wall, last_wall
+    type(axis_t) :: axis
 
-    select case (name)
-    case ('fixed')
-      kind = WALL_FIXED
-    case ('roller')
-      kind = WALL_ROLLER
-    case default
-      kind = WALL_FREE
-    end select
-  end function wall_kind
+    axis%origin = low - GHOST*cell
+    axis%inverse_cell = 1.0_wp/cell
+    axis%last = nint((high - low)/nominal) + 2*GHOST
+    axis%last_base = axis%last - 2
+    axis%first_wall = merge(NO_WALL, GHOST, first_wall == 'free')
+    axis%last_wall = merge(NO_WALL, axis%last - GHOST, last_wall == 'free')
+  end function create_axis
 
   !> The window that covers the stencils of all points of the tally; one node more on every side,
   !> since the domain of a point is up to a cell wide.
@@ -143,57 +145,56 @@ contains
     class(grid_t), intent(inout) :: this
     type(tally_t), intent(in) :: tally
 
-    this%i_first = node_below(tally%x_min, this%x_origin, this%nx) - 1
-    this%i_last = node_below(tally%x_max, this%x_origin, this%nx) + 2
-    this%j_first = node_below(tally%y_min, this%y_origin, this%ny) - 1
-    this%j_last = node_below(tally%y_max, this%y_origin, this%ny) + 2
-    this%i_first = max(this%i_first, 0)
-    this%i_last = min(this%i_last, this%nx)
-    this%j_first = max(this%j_first, 0)
-    this%j_last = min(this%j_last, this%ny)
-
-  contains
-
-    pure function node_below(position, origin, last) result(node)
-      real(wp), intent(in) :: position, origin
-      integer, intent(in) :: last
-      integer :: node
-      node = min(max(floor((position - origin)*this%inverse_cell), 0), last)
-    end function node_below
+    this%window(1) = max(node_below(tally%x_min, this%x) - 1, 0)
+    this%window(2) = min(node_below(tally%x_max, this%x) + 2, this%x%last)
+    this%window(3) = max(node_below(tally%y_min, this%y) - 1, 0)
+    this%window(4) = min(node_below(tally%y_max, this%y) + 2, this%y%last)
   end subroutine set_window
+
+  !> The last node that is not above `position`, held within the grid.
+  pure function node_below(position, axis) result(node)
+    real(wp), intent(in) :: position
+    type(axis_t), intent(in) :: axis
+    integer :: node
+    node = floor(min(max((position - axis%origin)*axis%inverse_cell, 0.0_wp), &
+      real(axis%last, wp)))
+  end function node_below
 
   !> a_i = (f_int + f_ext)/m_i - c_d v_i (Eq. 14); v_i += a_i dt; walls. Leaves motion = (v_new -
   !> v_old, v_new),
   !> where v_old is the velocity before any wall, so that points also take the impulse of the wall.
   !> Clears the sums.
-  !> `damping_work`: energy in J/m that damping took in this step.
-  subroutine integrate_momentum(this, time_step, gravity, damping, damping_work)
+  subroutine integrate_momentum(this, time_step, gravity, damping, losses)
     class(grid_t), intent(inout) :: this
     !> In s, m/s^2, 1/s.
     real(wp), intent(in) :: time_step, gravity(2), damping
-    real(wp), intent(out) :: damping_work
+    type(losses_t), intent(out) :: losses
 
-    call integrate_nodes(this, time_step, gravity, damping, this%nx, this%ny, &
-      this%total_store(this%total_start), &
-                         this%motion_store(this%motion_start), damping_work)
-    call this%hold_walls(with_increment=.true.)
+    associate (total => this%total_store(this%total_start:), &
+      motion => this%motion_store(this%motion_start:))
+      call integrate_nodes(this%window, this%least_mass, time_step, gravity, damping, &
+        this%x%last, this%y%last, total, motion, losses%damping)
+      call apply_conditions(this%conditions, this%window, this%least_mass, this%x%last, &
+        this%y%last, total, motion, losses%walls)
+      call clear_nodes(this%window, this%x%last, this%y%last, total)
+    end associate
   end subroutine integrate_momentum
 
-  pure subroutine integrate_nodes(grid, time_step, gravity, damping, nx, ny, total, motion, &
-    damping_work)
-    type(grid_t), intent(in) :: grid
-    real(wp), intent(in) :: time_step, gravity(2), damping
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:nx, 0:ny), motion(4, 0:nx, 0:ny)
+  pure subroutine integrate_nodes(window, least_mass, time_step, gravity, damping, nx, ny, total, &
+    motion, damping_work)
+    integer, intent(in) :: window(4), nx, ny
+    real(wp), intent(in) :: least_mass, time_step, gravity(2), damping
+    real(wp), intent(in) :: total(8, 0:nx, 0:ny)
+    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
     real(wp), intent(out) :: damping_work
     real(wp) :: mass, inverse_mass, vx, vy, dvx, dvy
     integer :: i, j
 
     damping_work = 0.0_wp
-    do j = grid%j_first, grid%j_last
-      do i = grid%i_first, grid%i_last
+    do j = window(3), window(4)
+      do i = window(1), window(2)
         mass = total(1, i, j)
-        if (mass > grid%least_mass) then
+        if (mass > least_mass) then
           inverse_mass = 1.0_wp/mass
           vx = total(2, i, j)*inverse_mass
           vy = total(3, i, j)*inverse_mass
@@ -204,7 +205,6 @@ contains
         else
           motion(:, i, j) = 0.0_wp
         end if
-        total(:, i, j) = 0.0_wp
       end do
     end do
     damping_work = damping_work*damping*time_step
@@ -214,9 +214,11 @@ contains
   subroutine find_velocity(this)
     class(grid_t), intent(inout) :: this
 
-    call divide_momentum(this, this%nx, this%ny, this%total_store(this%total_start), &
-                         this%motion_store(this%motion_start))
-    call this%hold_walls(with_increment=.false.)
+    associate (total => this%total_store(this%total_start:), &
+      motion => this%motion_store(this%motion_start:))
+      call divide_momentum(this%window, this%least_mass, this%x%last, this%y%last, total, motion)
+      call hold_conditions(this%conditions, this%window, this%x%last, this%y%last, motion)
+    end associate
   end subroutine find_velocity
 
   !> motion = (v_i, p_i/m_i): the velocity that moves the points stays, beside the one mapped back
@@ -224,24 +226,22 @@ contains
   subroutine remap_velocity(this)
     class(grid_t), intent(inout) :: this
 
-    call divide_momentum(this, this%nx, this%ny, this%total_store(this%total_start), &
-                         this%motion_store(this%motion_start))
-    call clear_nodes(this, this%nx, this%ny, this%total_store(this%total_start))
-    call this%hold_walls(with_increment=.false.)
+    call this%find_velocity()
+    call clear_nodes(this%window, this%x%last, this%y%last, this%total_store(this%total_start:))
   end subroutine remap_velocity
 
   !> motion = (old motion(3:4), p_i/m_i).
-  pure subroutine divide_momentum(grid, nx, ny, total, motion)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: nx, ny
+  pure subroutine divide_momentum(window, least_mass, nx, ny, total, motion)
+    integer, intent(in) :: window(4), nx, ny
+    real(wp), intent(in) :: least_mass
     real(wp), intent(in) :: total(8, 0:nx, 0:ny)
     real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
     integer :: i, j
 
-    do j = grid%j_first, grid%j_last
-      do i = grid%i_first, grid%i_last
+    do j = window(3), window(4)
+      do i = window(1), window(2)
         motion(1:2, i, j) = motion(3:4, i, j)
-        if (total(1, i, j) > grid%least_mass) then
+        if (total(1, i, j) > least_mass) then
           motion(3:4, i, j) = total(2:3, i, j)/total(1, i, j)
         else
           motion(3:4, i, j) = 0.0_wp
@@ -250,67 +250,23 @@ contains
     end do
   end subroutine divide_momentum
 
-  pure subroutine clear_nodes(grid, nx, ny, total)
-    type(grid_t), intent(in) :: grid
-    integer, intent(in) :: nx, ny
+  pure subroutine clear_nodes(window, nx, ny, total)
+    integer, intent(in) :: window(4), nx, ny
     real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
 
-    total(:, grid%i_first:grid%i_last, grid%j_first:grid%j_last) = 0.0_wp
+    total(:, window(1):window(2), window(3):window(4)) = 0.0_wp
   end subroutine clear_nodes
 
-  !> Nodes on and behind a wall: a roller takes the normal component of motion(3:4), a fixed wall
-  !> both.
-  !> `with_increment` takes what is lost off motion(1:2) too.
-  subroutine hold_walls(this, with_increment)
-    class(grid_t), intent(inout) :: this
-    logical, intent(in) :: with_increment
+  !> Force of the prescribed velocities on the material in the last step, in N/m.
+  pure function reaction(this, time_step) result(force)
+    class(grid_t), intent(in) :: this
+    real(wp), intent(in) :: time_step
+    real(wp) :: force(2)
+    integer :: c
 
-    if (this%left /= WALL_FREE) then
-      call hold(this%i_first, min(this%left_node, this%i_last), this%j_first, this%j_last, .true., &
-                this%left == WALL_FIXED)
-    end if
-    if (this%right /= WALL_FREE) then
-      call hold(max(this%right_node, this%i_first), this%i_last, this%j_first, this%j_last, &
-        .true., &
-                this%right == WALL_FIXED)
-    end if
-    if (this%bottom /= WALL_FREE) then
-      call hold(this%i_first, this%i_last, this%j_first, min(this%bottom_node, this%j_last), &
-                this%bottom == WALL_FIXED, .true.)
-    end if
-    if (this%top /= WALL_FREE) then
-      call hold(this%i_first, this%i_last, max(this%top_node, this%j_first), this%j_last, &
-                this%top == WALL_FIXED, .true.)
-    end if
-
-  contains
-
-    subroutine hold(i_first, i_last, j_first, j_last, hold_x, hold_y)
-      integer, intent(in) :: i_first, i_last, j_first, j_last
-      logical, intent(in) :: hold_x, hold_y
-
-      call hold_nodes([i_first, i_last, j_first, j_last], [hold_x, hold_y], with_increment, &
-        this%nx, this%ny, &
-                      this%motion_store(this%motion_start))
-    end subroutine hold
-  end subroutine hold_walls
-
-  !> Holds the components `held` of the nodes `box` = (i_first, i_last, j_first, j_last).
-  pure subroutine hold_nodes(box, held, with_increment, nx, ny, motion)
-    integer, intent(in) :: box(4)
-    logical, intent(in) :: held(2), with_increment
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
-    integer :: i, j, k
-
-    do j = box(3), box(4)
-      do i = box(1), box(2)
-        do k = 1, 2
-          if (.not. held(k)) cycle
-          if (with_increment) motion(k, i, j) = motion(k, i, j) - motion(k + 2, i, j)
-          motion(k + 2, i, j) = 0.0_wp
-        end do
-      end do
+    force = 0.0_wp
+    do c = 1, size(this%conditions)
+      if (this%conditions(c)%is_prescribed) force = force + this%conditions(c)%impulse/time_step
     end do
-  end subroutine hold_nodes
+  end function reaction
 end module sg_grid

@@ -1,10 +1,10 @@
 !> Stress before the first step: that of level ground under its own weight, made admissible.
 module sg_initial_stress
   use sg_kinds, only: wp
-  use sg_materials, only: material_t, MODEL_MOHR_COULOMB
-  use sg_mohr_coulomb, only: return_stress
+  use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_MOHR_COULOMB
   use sg_particles, only: particles_t
   use sg_sorting, only: sort_index
+  use sg_stress_update, only: return_block
   use sg_weighting, only: BLOCK
   implicit none
   private
@@ -57,14 +57,11 @@ contains
 
     do body = 1, size(particles%bodies)
       associate (p => particles, b => particles%bodies(body))
-        if (materials(b%material)%model /= MODEL_MOHR_COULOMB) cycle
+        if (.not. any(materials(b%material)%model == [MODEL_MOHR_COULOMB, &
+          MODEL_DRUCKER_PRAGER])) cycle
         do first = b%first, b%last, BLOCK
           last = min(first + BLOCK - 1, b%last)
-          call return_stress(last - first + 1, materials(b%material), p%sin_friction(first:last), &
-                             p%cohesion_term(first:last), p%tension_limit(first:last), &
-                             p%sxx(first:last), &
-                             p%syy(first:last), p%szz(first:last), p%sxy(first:last), &
-                             p%gap(first:last))
+          call return_block(p, materials(b%material), first, last)
         end do
       end associate
     end do

@@ -6,10 +6,17 @@ module sg_materials
   private
 
   public :: material_t, create_material, mohr_coulomb_strength
-  public :: MODEL_LINEAR_ELASTIC, MODEL_MOHR_COULOMB
+  public :: MODEL_LINEAR_ELASTIC, MODEL_NEO_HOOKEAN, MODEL_MOHR_COULOMB, MODEL_DRUCKER_PRAGER
 
   integer, parameter :: MODEL_LINEAR_ELASTIC = 1
-  integer, parameter :: MODEL_MOHR_COULOMB = 2
+  integer, parameter :: MODEL_NEO_HOOKEAN = 2
+  !> Mohr-Coulomb; Tresca is the one with phi = 0 and no limit of tension.
+  integer, parameter :: MODEL_MOHR_COULOMB = 3
+  !> Drucker-Prager; von Mises is the one with alpha = 0 and no limit of tension.
+  integer, parameter :: MODEL_DRUCKER_PRAGER = 4
+
+  !> Tension limit of a material that has none, as a multiple of its shear strength.
+  real(wp), parameter :: UNLIMITED = 1.0e12_wp
 
   real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
@@ -21,9 +28,19 @@ module sg_materials
     !> Lame's first constant, shear and bulk modulus, in Pa.
     real(wp) :: lame, shear, bulk
     real(wp) :: poisson
-    !> Mohr-Coulomb: friction angle in degrees, sine of the dilation angle, cohesion and tension
-    !> strength in Pa.
-    real(wp) :: friction_angle, sin_dilation, cohesion, tension_strength
+    !> Mohr-Coulomb: friction and dilation angle in degrees, sine of the latter, cohesion and
+    !> tension strength in Pa.
+    real(wp) :: friction_angle = 0.0_wp, dilation_angle = 0.0_wp, sin_dilation = 0.0_wp
+    real(wp) :: cohesion = 0.0_wp
+    real(wp) :: tension_strength = 0.0_wp
+    !> Softening of Mohr-Coulomb: strength left, in degrees and Pa, and the equivalent plastic
+    !> strains between which it falls; strain at which dilation has faded (0: never).
+    logical :: softens = .false.
+    real(wp) :: residual_friction_angle = 0.0_wp, residual_cohesion = 0.0_wp
+    real(wp) :: softening_start = 0.0_wp, softening_end = 0.0_wp, dilation_end = 0.0_wp
+    !> Drucker-Prager: f = sqrt(J2) + alpha I1 - k, flow with alpha_flow, mean stress at most
+    !> mean_limit; k and mean_limit in Pa.
+    real(wp) :: alpha = 0.0_wp, alpha_flow = 0.0_wp, k = 0.0_wp, mean_limit = 0.0_wp
   end type material_t
 
 contains
@@ -33,35 +50,108 @@ contains
     type(material_config_t), intent(in) :: config
     type(material_t) :: material
 
-    material%model = merge(MODEL_MOHR_COULOMB, MODEL_LINEAR_ELASTIC, config%model == 'mohr_coulomb')
     material%density = config%density
     material%poisson = config%poisson
     material%lame = config%young*config%poisson/((1.0_wp + config%poisson)*(1.0_wp &
       - 2.0_wp*config%poisson))
     material%shear = config%young/(2.0_wp*(1.0_wp + config%poisson))
     material%bulk = material%lame + 2.0_wp/3.0_wp*material%shear
-    material%friction_angle = 0.0_wp
-    material%sin_dilation = 0.0_wp
-    material%cohesion = 0.0_wp
-    material%tension_strength = 0.0_wp
-    if (material%model == MODEL_MOHR_COULOMB) then
+    select case (config%model)
+    case ('mohr_coulomb')
+      material%model = MODEL_MOHR_COULOMB
       material%friction_angle = config%friction_angle
+      material%dilation_angle = config%dilation_angle
       material%sin_dilation = sin(config%dilation_angle*DEGREE)
       material%cohesion = config%cohesion
       material%tension_strength = config%tension_strength
-    end if
+      call set_softening(config, material)
+    case ('tresca')
+      material%model = MODEL_MOHR_COULOMB
+      material%cohesion = config%undrained_strength
+      material%tension_strength = UNLIMITED*config%undrained_strength
+    case ('drucker_prager')
+      material%model = MODEL_DRUCKER_PRAGER
+      material%friction_angle = config%friction_angle
+      call set_cone(config, material)
+    case ('von_mises')
+      ! In plane strain the out-of-plane stress settles midway, where sqrt(J2) is half the
+      ! difference of the other two.
+      material%model = MODEL_DRUCKER_PRAGER
+      material%k = config%undrained_strength
+      material%mean_limit = UNLIMITED*config%undrained_strength
+    case ('neo_hookean')
+      material%model = MODEL_NEO_HOOKEAN
+    case default
+      material%model = MODEL_LINEAR_ELASTIC
+    end select
   end function create_material
 
-  !> Strength of a point with the friction angle `friction_angle` in degrees: sin(phi), 2 c
-  !> cos(phi), and the largest tension, min(tension strength, c cot(phi)).
-  elemental subroutine mohr_coulomb_strength(material, friction_angle, sin_friction, &
+  pure subroutine set_softening(config, material)
+    type(material_config_t), intent(in) :: config
+    type(material_t), intent(inout) :: material
+
+    material%dilation_end = config%dilation_end
+    material%softens = config%softening == 'linear' .or. config%dilation_end > 0.0_wp
+    material%residual_friction_angle = config%friction_angle
+    material%residual_cohesion = config%cohesion
+    material%softening_end = 1.0_wp
+    if (config%softening /= 'linear') return
+    material%residual_friction_angle = config%residual_friction_angle
+    material%residual_cohesion = config%residual_cohesion
+    material%softening_start = config%softening_start
+    material%softening_end = config%softening_end
+  end subroutine set_softening
+
+  !> alpha (on I1) and k of the cone. All have their apex at I1 = 3 c cot(phi), k = 3 alpha c
+  !> cot(phi); with s = sin(phi), alpha = s/q:
+  !>   outer, inner              q = sqrt(3) (3 -+ s): the compression and the extension edges
+  !>   equal_area                circle of the area of the hexagon, q = sqrt(2 sqrt(3) pi (9 - s^2))/
+  !>                             (2 sqrt(3))
+  !>   plane_strain              same limit load in plane strain with the dilation psi: with
+  !>                             alpha_f = sin(psi)/sqrt(9 + 3 sin(psi)^2),
+  !>                             q = 3 (sqrt(1 - 3 alpha_f^2) + alpha_f s)
+  !>   plane_strain_associated   the same with psi = phi, q = sqrt(9 + 3 s^2): the inscribed cone
+  !> Drucker & Prager 1952; Chen & Han 1988. Flow has alpha_f for all of them.
+  pure subroutine set_cone(config, material)
+    type(material_config_t), intent(in) :: config
+    type(material_t), intent(inout) :: material
+    real(wp), parameter :: ROOT3 = sqrt(3.0_wp)
+    real(wp), parameter :: PI = acos(-1.0_wp)
+    real(wp) :: s, q
+
+    s = sin(config%friction_angle*DEGREE)
+    material%sin_dilation = sin(config%dilation_angle*DEGREE)
+    material%alpha_flow = material%sin_dilation/sqrt(9.0_wp + 3.0_wp*material%sin_dilation**2)
+    select case (config%cone)
+    case ('outer')
+      q = 0.5_wp*ROOT3*(3.0_wp - s)
+    case ('inner')
+      q = 0.5_wp*ROOT3*(3.0_wp + s)
+    case ('equal_area')
+      q = sqrt(2.0_wp*ROOT3*PI*(9.0_wp - s**2))/(2.0_wp*ROOT3)
+    case ('plane_strain_associated')
+      q = sqrt(9.0_wp + 3.0_wp*s**2)
+    case default ! plane_strain
+      q = 3.0_wp*(sqrt(1.0_wp - 3.0_wp*material%alpha_flow**2) + material%alpha_flow*s)
+    end select
+    material%alpha = s/q
+    material%k = 3.0_wp*config%cohesion*cos(config%friction_angle*DEGREE)/q
+    material%mean_limit = config%tension_strength
+    if (material%k < 3.0_wp*material%alpha*material%mean_limit) then
+      material%mean_limit = material%k/(3.0_wp*material%alpha)
+    end if
+  end subroutine set_cone
+
+  !> Strength of a point with the friction angle `friction_angle` in degrees and `cohesion` in Pa:
+  !> sin(phi), 2 c cos(phi), and the largest tension, min(tension strength, c cot(phi)).
+  elemental subroutine mohr_coulomb_strength(material, friction_angle, cohesion, sin_friction, &
     cohesion_term, tension_limit)
     type(material_t), intent(in) :: material
-    real(wp), intent(in) :: friction_angle
+    real(wp), intent(in) :: friction_angle, cohesion
     real(wp), intent(out) :: sin_friction, cohesion_term, tension_limit
 
     sin_friction = sin(friction_angle*DEGREE)
-    cohesion_term = 2.0_wp*material%cohesion*cos(friction_angle*DEGREE)
+    cohesion_term = 2.0_wp*cohesion*cos(friction_angle*DEGREE)
     tension_limit = material%tension_strength
     ! c cot(phi) = (2 c cos(phi)) / (2 sin(phi)); without friction there is no apex.
     if (cohesion_term < 2.0_wp*sin_friction*tension_limit) then

@@ -6,7 +6,7 @@ module sg_particles
   implicit none
   private
 
-  public :: particles_t, body_points_t, copy_particles
+  public :: particles_t, body_points_t
 
   !> The points of one body.
   type :: body_points_t
@@ -14,7 +14,7 @@ module sg_particles
     integer :: first, last
     !> Index into the materials of the scene.
     integer :: material
-    !> Full width and height of a point, in m; it does not change (uGIMP).
+    !> Full width and height of a point at the start, in m.
     real(wp) :: width, height
     !> Its points are what runouts, heights and the profile are measured on.
     logical :: is_measured = .true.
@@ -29,6 +29,8 @@ module sg_particles
     real(wp), allocatable :: x_start(:), y_start(:)
     !> Mass in kg/m and current volume in m^2 (per metre of thickness), [count].
     real(wp), allocatable :: mass(:), volume(:)
+    !> Full width and height of the domain of a point, [count], in m; they change with cpGIMP only.
+    real(wp), allocatable :: width(:), height(:)
     !> Cauchy stress, [count], in Pa.
     real(wp), allocatable :: sxx(:), syy(:), szz(:), sxy(:)
     !> Volumetric opening of a point that carries no stress, [count]; a strain >= 0.
@@ -36,24 +38,28 @@ module sg_particles
     !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the
     !> largest principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
     real(wp), allocatable :: sin_friction(:), cohesion_term(:), tension_limit(:)
+    !> Deformation gradient, [count]; size 0 where neither material nor weights need it.
+    real(wp), allocatable :: fxx(:), fxy(:), fyx(:), fyy(:)
     !> Friction angle as it was given, [count], in degrees; for output only.
     real(wp), allocatable :: friction_angle(:)
-    !> Equivalent deviatoric plastic strain, [count]; size 0 where nobody asked for it.
+    !> Equivalent deviatoric plastic strain, [count]; size 0 where no material needs it and nobody
+    !> asked for it.
     real(wp), allocatable :: plastic_strain(:)
   contains
     procedure :: init => init_particles
     procedure :: is_measured
     procedure :: has_plastic_strain
+    procedure :: has_deformation
+    procedure :: track_plastic_strain
+    procedure :: track_deformation
   end type particles_t
 
 contains
 
-  !> All arrays at the length `count` and zero; `track_plastic_strain` also keeps the plastic
-  !> strain.
-  subroutine init_particles(this, count, track_plastic_strain)
+  !> All arrays at the length `count` and zero, but for those that must be asked for.
+  subroutine init_particles(this, count)
     class(particles_t), intent(out) :: this
     integer, intent(in) :: count
-    logical, intent(in) :: track_plastic_strain
 
     this%count = count
     allocate (this%x(count), this%y(count), this%vx(count), this%vy(count))
@@ -61,13 +67,14 @@ contains
     allocate (this%sxx(count), this%syy(count), this%szz(count), this%sxy(count))
     allocate (this%gap(count), this%sin_friction(count), this%cohesion_term(count))
     allocate (this%tension_limit(count), this%friction_angle(count))
-    allocate (this%plastic_strain(merge(count, 0, track_plastic_strain)))
+    allocate (this%width(count), this%height(count))
+    allocate (this%plastic_strain(0), this%fxx(0), this%fxy(0), this%fyx(0), this%fyy(0))
     this%x = 0.0_wp; this%y = 0.0_wp; this%vx = 0.0_wp; this%vy = 0.0_wp
     this%x_start = 0.0_wp; this%y_start = 0.0_wp; this%mass = 0.0_wp; this%volume = 0.0_wp
     this%sxx = 0.0_wp; this%syy = 0.0_wp; this%szz = 0.0_wp; this%sxy = 0.0_wp
     this%gap = 0.0_wp; this%sin_friction = 0.0_wp; this%cohesion_term = 0.0_wp
     this%tension_limit = 0.0_wp; this%friction_angle = 0.0_wp
-    this%plastic_strain = 0.0_wp
+    this%width = 0.0_wp; this%height = 0.0_wp
   end subroutine init_particles
 
   !> Mask of the points of measured bodies, [count].
@@ -88,17 +95,34 @@ contains
     has = size(this%plastic_strain) == this%count
   end function has_plastic_strain
 
-  !> A fresh copy of `source` for one member, with or without plastic strain.
-  subroutine copy_particles(source, track_plastic_strain, target)
-    type(particles_t), intent(in) :: source
-    logical, intent(in) :: track_plastic_strain
-    type(particles_t), intent(out) :: target
+  !> Is the deformation gradient kept?
+  pure function has_deformation(this) result(has)
+    class(particles_t), intent(in) :: this
+    logical :: has
+    has = size(this%fxx) == this%count
+  end function has_deformation
 
-    target = source
-    if (track_plastic_strain .neqv. target%has_plastic_strain()) then
-      deallocate (target%plastic_strain)
-      allocate (target%plastic_strain(merge(target%count, 0, track_plastic_strain)))
-      target%plastic_strain = 0.0_wp
-    end if
-  end subroutine copy_particles
+  !> Keeps the plastic strain from now on, from 0.
+  subroutine track_plastic_strain(this)
+    class(particles_t), intent(inout) :: this
+
+    if (this%has_plastic_strain()) return
+    deallocate (this%plastic_strain)
+    allocate (this%plastic_strain(this%count))
+    this%plastic_strain = 0.0_wp
+  end subroutine track_plastic_strain
+
+  !> Keeps the deformation gradient from now on, from the identity.
+  subroutine track_deformation(this)
+    class(particles_t), intent(inout) :: this
+
+    if (this%has_deformation()) return
+    deallocate (this%fxx, this%fxy, this%fyx, this%fyy)
+    allocate (this%fxx(this%count), this%fxy(this%count), this%fyx(this%count), &
+      this%fyy(this%count))
+    this%fxx = 1.0_wp
+    this%fxy = 0.0_wp
+    this%fyx = 0.0_wp
+    this%fyy = 1.0_wp
+  end subroutine track_deformation
 end module sg_particles

@@ -89,7 +89,7 @@ contains
       end if
     end do
     count = sum(lattices%count)
-    call scene%particles%init(count, track_plastic_strain=.false.)
+    call scene%particles%init(count)
     allocate (scene%particles%bodies(size(lattices)))
     count = 0
     do k = 1, size(lattices)
@@ -128,6 +128,8 @@ contains
       p%y(first:last) = lattice%y
       p%x_start(first:last) = lattice%x
       p%y_start(first:last) = lattice%y
+      p%width(first:last) = lattice%width
+      p%height(first:last) = lattice%height
       p%vx(first:last) = config%bodies(k)%velocity(1)
       p%vy(first:last) = config%bodies(k)%velocity(2)
       p%volume(first:last) = lattice%width*lattice%height
@@ -170,7 +172,7 @@ contains
       associate (b => particles%bodies(body))
         if (materials(b%material)%model /= MODEL_MOHR_COULOMB) cycle
         call mohr_coulomb_strength(materials(b%material), &
-          particles%friction_angle(b%first:b%last), &
+          particles%friction_angle(b%first:b%last), materials(b%material)%cohesion, &
                                    particles%sin_friction(b%first:b%last), &
                                    particles%cohesion_term(b%first:b%last), &
                                    particles%tension_limit(b%first:b%last))

@@ -12,7 +12,6 @@ module sg_simulation
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
     RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_NOT_FINITE, STATUS_OK, &
     STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
-  use sg_particles, only: copy_particles
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle
@@ -118,16 +117,18 @@ contains
     type(solver_t), intent(out) :: solver
 
     solver%materials = scene%materials
-    call copy_particles(scene%particles, observer%wants_plastic_strain, solver%particles)
+    solver%particles = scene%particles
+    if (observer%wants_plastic_strain) call solver%particles%track_plastic_strain()
     if (allocated(variation%friction_angle)) then
       call set_friction_angle(solver%materials, variation%material, variation%friction_angle, &
         solver%particles)
     end if
+    call solver%configure(config)
     if (config%loading%initial_stress == 'geostatic') then
       call make_admissible(solver%particles, solver%materials)
     end if
-    call solver%configure(config)
-    call solver%grid%init(config%grid, variation%cell_stretch, minval(solver%particles%mass))
+    call solver%grid%init(config%grid, config%boundaries, variation%cell_stretch, &
+      minval(solver%particles%mass))
     call solver%start()
   end subroutine prepare
 

@@ -11,16 +11,16 @@
 !> All are made of the same sweep with other parts of it switched on.
 module sg_solver
   use sg_config, only: config_t
-  use sg_grid, only: grid_t, tally_t
+  use sg_grid, only: grid_t, losses_t, tally_t
   use sg_kinds, only: wp
-  use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power, update_volume
-  use sg_materials, only: material_t, MODEL_MOHR_COULOMB
-  use sg_mohr_coulomb, only: close_gap, return_stress
+  use sg_materials, only: material_t, MODEL_NEO_HOOKEAN
+  use sg_neo_hookean, only: find_stretch
   use sg_particles, only: body_points_t, particles_t
+  use sg_stress_update, only: update_stress, wave_speed_squared
   use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_force, map_momentum, &
     map_momentum_and_force
-  use sg_weighting, only: axis_weights_interface, BLOCK, gimp_axis_weights, linear_axis_weights, &
-    weights_t
+  use sg_weighting, only: axis_weights_interface, BLOCK, bspline_axis_weights, &
+    cpgimp_axis_weights, gimp_axis_weights, linear_axis_weights, weights_t
   implicit none
   private
 
@@ -47,13 +47,15 @@ module sg_solver
     procedure(axis_weights_interface), pointer, nopass :: axis_weights => null()
     !> Share of FLIP (1 - share is PIC), gravity in m/s^2, damping in 1/s.
     real(wp) :: flip, gravity(2), damping
+    !> The domains of the points follow their stretch (cpGIMP).
+    logical :: stretches_domains = .false.
     type(material_t), allocatable :: materials(:)
     type(grid_t) :: grid
     type(particles_t) :: particles
     !> What the last step found out about the points.
     type(tally_t) :: tally
-    !> Work of the stresses and of the damping since the start, J/m.
-    real(wp) :: internal_work = 0.0_wp, damping_work = 0.0_wp
+    !> Work of the stresses, and energy taken by damping and by the walls since the start, J/m.
+    real(wp) :: internal_work = 0.0_wp, damping_work = 0.0_wp, wall_work = 0.0_wp
   contains
     procedure :: configure
     procedure :: start
@@ -61,13 +63,14 @@ module sg_solver
     procedure, private :: sweep_points
     procedure, private :: sweep_block
     procedure, private :: find_weights
-    procedure, private :: strain_block
+    procedure, private :: stretch_domains
     procedure, private :: note_block
   end type solver_t
 
 contains
 
-  !> Takes the choices of the configuration; grid, particles and materials are set by the caller.
+  !> Takes the choices of the configuration; particles and materials are there already, the grid
+  !> follows.
   subroutine configure(this, config)
     class(solver_t), intent(inout) :: this
     type(config_t), intent(in) :: config
@@ -80,11 +83,21 @@ contains
     case default
       this%scheme = SCHEME_MUSL
     end select
-    if (config%solver%weighting == 'linear') then
+    select case (config%solver%weighting)
+    case ('linear')
       this%axis_weights => linear_axis_weights
-    else
+    case ('cpgimp')
+      this%axis_weights => cpgimp_axis_weights
+    case ('bspline')
+      this%axis_weights => bspline_axis_weights
+    case default
       this%axis_weights => gimp_axis_weights
+    end select
+    this%stretches_domains = config%solver%weighting == 'cpgimp'
+    if (this%stretches_domains .or. any(this%materials%model == MODEL_NEO_HOOKEAN)) then
+      call this%particles%track_deformation()
     end if
+    if (any(this%materials%softens)) call this%particles%track_plastic_strain()
     this%flip = config%solver%flip
     this%gravity = config%loading%gravity
     this%damping = config%loading%damping
@@ -96,6 +109,7 @@ contains
 
     this%internal_work = 0.0_wp
     this%damping_work = 0.0_wp
+    this%wall_work = 0.0_wp
     call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
       0.0_wp)
     call note_all(this)
@@ -113,34 +127,25 @@ contains
         last = min(first + BLOCK - 1, this%particles%bodies(body)%last)
         call this%note_block(first, last)
         this%tally%wave_squared = max(this%tally%wave_squared, wave_speed_squared( &
-          this%materials(this%particles%bodies(body)%material), this%particles%volume(first), &
-          this%particles%mass(first)))
+          this%particles, this%materials(this%particles%bodies(body)%material), first, last))
       end do
     end do
   end subroutine note_all
-
-  !> Square of the speed of compression waves, (lambda + 2 G) V/m.
-  elemental function wave_speed_squared(material, volume, mass) result(squared)
-    type(material_t), intent(in) :: material
-    real(wp), intent(in) :: volume, mass
-    real(wp) :: squared
-    squared = (material%lame + 2.0_wp*material%shear)*volume/mass
-  end function wave_speed_squared
 
   !> One step of `time_step` seconds.
   subroutine advance(this, time_step)
     class(solver_t), intent(inout) :: this
     real(wp), intent(in) :: time_step
-    real(wp) :: damping_work
+    type(losses_t) :: losses
 
     call this%tally%reset()
     select case (this%scheme)
     case (SCHEME_USL)
-      call this%grid%integrate_momentum(time_step, this%gravity, this%damping, damping_work)
+      call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., update_stress=.true., move_with=3, &
                                      map_momentum=.true., map_force=.true.), time_step)
     case (SCHEME_MUSL)
-      call this%grid%integrate_momentum(time_step, this%gravity, this%damping, damping_work)
+      call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., map_momentum=.true.), time_step)
       call this%grid%remap_velocity()
       call this%sweep_points(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
@@ -149,11 +154,12 @@ contains
     case default ! SCHEME_USF
       call this%grid%find_velocity()
       call this%sweep_points(sweep_t(update_stress=.true., map_force=.true.), time_step)
-      call this%grid%integrate_momentum(time_step, this%gravity, this%damping, damping_work)
+      call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., move_with=3, map_momentum=.true.), &
         time_step)
     end select
-    this%damping_work = this%damping_work + damping_work
+    this%damping_work = this%damping_work + losses%damping
+    this%wall_work = this%wall_work + losses%walls
     this%internal_work = this%internal_work + this%tally%internal_work
     call this%grid%set_window(this%tally)
   end subroutine advance
@@ -186,133 +192,72 @@ contains
 
     n = last - first + 1
     associate (p => this%particles, g => this%grid)
-      call this%find_weights(body, first, last, w)
+      call this%find_weights(first, last, w)
       if (sweep%update_stress) then
-        call gather_motion_and_gradient(n, w, g%nx, g%ny, g%motion_store(g%motion_start), value, &
+        call gather_motion_and_gradient(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value, &
           gradient)
       else if (sweep%update_velocity) then
-        call gather_motion(n, w, g%nx, g%ny, g%motion_store(g%motion_start), value)
+        call gather_motion(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value)
       end if
       if (sweep%update_velocity) then
         call update_velocity(n, this%flip, value, p%vx(first:last), p%vy(first:last))
       end if
-      if (sweep%update_stress) call this%strain_block(time_step, gradient, body, first, last)
+      if (sweep%update_stress) then
+        call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
+          this%tally%internal_work, this%tally%wave_squared)
+        if (this%stretches_domains) call this%stretch_domains(body, first, last)
+      end if
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
           p%x(first:last), &
                          p%y(first:last), this%tally%motion_energy)
         call this%note_block(first, last)
-        call this%find_weights(body, first, last, w)
+        call this%find_weights(first, last, w)
       end if
       if (sweep%map_momentum .and. sweep%map_force) then
         call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
                                     p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-                                    p%sxy(first:last), g%nx, g%ny, g%total_store(g%total_start))
+                                    p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), g%nx, &
-          g%ny, g%total_store(g%total_start))
+        call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), g%x%last, &
+          g%y%last, g%total_store(g%total_start))
       else if (sweep%map_force) then
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-                       p%sxy(first:last), g%nx, g%ny, g%total_store(g%total_start))
+                       p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       end if
     end associate
   end subroutine sweep_block
 
   !> Weights of the points `first` to `last` at their present place.
-  pure subroutine find_weights(this, body, first, last, w)
+  pure subroutine find_weights(this, first, last, w)
     class(solver_t), intent(in) :: this
-    type(body_points_t), intent(in) :: body
     integer, intent(in) :: first, last
     type(weights_t), intent(inout) :: w
     integer :: n
 
     n = last - first + 1
     associate (p => this%particles, g => this%grid)
-      call this%axis_weights(n, p%x(first:last), g%x_origin, g%inverse_cell, &
-        body%width*g%inverse_cell, &
-                             g%last_base_x, w%i, w%sx, w%gx)
-      call this%axis_weights(n, p%y(first:last), g%y_origin, g%inverse_cell, &
-        body%height*g%inverse_cell, &
-                             g%last_base_y, w%j, w%sy, w%gy)
+      call this%axis_weights(n, p%x(first:last), p%width(first:last), g%x, w%i, w%sx, w%gx)
+      call this%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, w%gy)
     end associate
   end subroutine find_weights
 
-  !> Strain, volume and stress of a block; adds its work and its largest wave speed to the tally.
-  subroutine strain_block(this, time_step, gradient, body, first, last)
+  !> cpGIMP: the domains of the points take their stretch.
+  subroutine stretch_domains(this, body, first, last)
     class(solver_t), intent(inout) :: this
-    real(wp), intent(in) :: time_step, gradient(4, BLOCK)
     type(body_points_t), intent(in) :: body
     integer, intent(in) :: first, last
-    type(strain_t) :: strain
-    real(wp) :: trial(4, BLOCK)
-    real(wp) :: work
+    real(wp) :: stretch_x(BLOCK), stretch_y(BLOCK)
     integer :: n
 
     n = last - first + 1
-    associate (p => this%particles, material => this%materials(body%material))
-      call find_strain(n, time_step, gradient, strain)
-      work = stress_power(n, strain, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-        p%sxy(first:last))
-      call update_volume(n, strain, p%volume(first:last))
-      if (material%model == MODEL_MOHR_COULOMB) call close_gap(n, strain, p%gap(first:last))
-      call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), &
-        p%syy(first:last), &
-                          p%szz(first:last), p%sxy(first:last))
-      if (material%model == MODEL_MOHR_COULOMB) then
-        if (p%has_plastic_strain()) then
-          trial(1, :n) = p%sxx(first:last)
-          trial(2, :n) = p%syy(first:last)
-          trial(3, :n) = p%szz(first:last)
-          trial(4, :n) = p%sxy(first:last)
-        end if
-        call return_stress(n, material, p%sin_friction(first:last), p%cohesion_term(first:last), &
-                           p%tension_limit(first:last), p%sxx(first:last), p%syy(first:last), &
-                           p%szz(first:last), p%sxy(first:last), p%gap(first:last))
-        if (p%has_plastic_strain()) then
-          call add_plastic_strain(n, material%shear, trial, p%sxx(first:last), p%syy(first:last), &
-                                  p%szz(first:last), p%sxy(first:last), &
-                                  p%plastic_strain(first:last))
-        end if
-      end if
-      work = work + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
-        p%syy(first:last), &
-                                 p%sxy(first:last))
-      this%tally%internal_work = this%tally%internal_work + 0.5_wp*work
-      this%tally%wave_squared = max(this%tally%wave_squared, largest_wave_speed( &
-        n, material%lame + 2.0_wp*material%shear, p%volume(first:last), p%mass(first:last), &
-        p%gap(first:last)))
+    associate (p => this%particles)
+      call find_stretch(n, p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), &
+        p%fyy(first:last), stretch_x, stretch_y)
+      p%width(first:last) = body%width*stretch_x(:n)
+      p%height(first:last) = body%height*stretch_y(:n)
     end associate
-  end subroutine strain_block
-
-  !> Square of the largest wave speed, M V/m, among points that carry stress, in (m/s)^2.
-  pure function largest_wave_speed(n, modulus, volume, mass, gap) result(squared)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: modulus, volume(n), mass(n), gap(n)
-    real(wp) :: squared
-    integer :: p
-
-    squared = 0.0_wp
-    !$omp simd reduction(max:squared)
-    do p = 1, n
-      squared = max(squared, merge(modulus*volume(p)/mass(p), 0.0_wp, gap(p) <= 0.0_wp))
-    end do
-  end function largest_wave_speed
-
-  !> Adds sqrt(2/3 e:e) with e = dev(trial - returned)/(2 G) to the equivalent plastic strain.
-  pure subroutine add_plastic_strain(n, shear, trial, sxx, syy, szz, sxy, plastic_strain)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: shear, trial(4, BLOCK), sxx(n), syy(n), szz(n), sxy(n)
-    real(wp), intent(inout) :: plastic_strain(n)
-    real(wp) :: change(4), mean
-    integer :: p
-
-    do p = 1, n
-      change = trial(:, p) - [sxx(p), syy(p), szz(p), sxy(p)]
-      mean = sum(change(1:3))/3.0_wp
-      plastic_strain(p) = plastic_strain(p) &
-        + sqrt(2.0_wp/3.0_wp*(sum((change(1:3) - mean)**2) + 2.0_wp*change(4)**2))/(2.0_wp*shear)
-    end do
-  end subroutine add_plastic_strain
+  end subroutine stretch_domains
 
   !> v_p = flip (v_p + sum S dv_i) + (1 - flip) sum S v_i.
   pure subroutine update_velocity(n, flip, value, vx, vy)

@@ -9,18 +9,28 @@
 !>   base = floor(xi - w/2), f = xi - w/2 - base, u = max(0, f + w - 1), d = max(0, 1 - f - w)
 !>   S_0 = ((1-f)^2 - d^2)/(2w),  S_2 = u^2/(2w),  S_1 = 1 - S_0 - S_2
 !>   S_2' = u/(w h),  S_0' = S_2' - 1/h,  S_1' = -(S_0' + S_2')
+!> cpGIMP: the same with the present width of each point, which follows its stretch.
 !> linear: base = floor(xi), f = xi - base; S = (1-f, f, 0), S' = (-1, 1, 0)/h.
+!> bspline (quadratic; Steffen, Kirby & Berzins 2008): d = xi - k of the nearest node k,
+!>   S = ((1/2-d)^2/2, 3/4-d^2, (1/2+d)^2/2),  S' = (d-1/2, -2d, d+1/2)/h;
+!>   where k is a wall, the node behind it is taken to continue the line through the next two, which
+!>   makes S linear there, (max(-d,0), 1-|d|, max(d,0)): the wall is then held exactly.
 module sg_weighting
   use sg_kinds, only: wp
   implicit none
   private
 
-  public :: weights_t, axis_weights_interface, BLOCK
-  public :: gimp_axis_weights, linear_axis_weights
+  public :: weights_t, axis_t, axis_weights_interface, BLOCK, NO_WALL
+  public :: gimp_axis_weights, cpgimp_axis_weights, linear_axis_weights, bspline_axis_weights
 
   !> Points that a kernel handles at a time: long enough to fill vector units, short enough for the
   !> first cache.
   integer, parameter :: BLOCK = 64
+  !> `first_wall` or `last_wall` of an axis that is open there.
+  integer, parameter :: NO_WALL = -1
+  !> Narrowest domain of a point in cells (cpGIMP): below, the weights are linear but for a strip
+  !> about the nodes that no longer matters, and the slopes would change within rounding.
+  real(wp), parameter :: LEAST_WIDTH = 1.0e-3_wp
 
   !> Weights of up to BLOCK points.
   type :: weights_t
@@ -30,19 +40,27 @@ module sg_weighting
     real(wp) :: sx(BLOCK, 3), sy(BLOCK, 3), gx(BLOCK, 3), gy(BLOCK, 3)
   end type weights_t
 
+  !> The nodes along one axis.
+  type :: axis_t
+    !> Position of node 0 in m, and 1/h in 1/m.
+    real(wp) :: origin, inverse_cell
+    !> Last node, and the largest allowed first node of a stencil: a point outside the grid is held
+    !> inside, so that no array is overrun before the end of the step reports it lost.
+    integer :: last, last_base
+    !> Nodes of the closed walls, NO_WALL where the axis is open.
+    integer :: first_wall, last_wall
+  end type axis_t
+
   abstract interface
-    !> Weights of `n` points along one axis. `last_base` is the largest allowed first node: a point
-    !> outside the grid is held inside, so that no array is overrun before the end of the step
-    !> reports it lost.
-    pure subroutine axis_weights_interface(n, x, origin, inverse_cell, width, last_base, base, s, g)
-      import :: wp, BLOCK
+    !> Weights of `n` points along one axis.
+    pure subroutine axis_weights_interface(n, x, width, axis, base, s, g)
+      import :: wp, axis_t, BLOCK
       implicit none
       integer, intent(in) :: n
-      !> Positions in m.
-      real(wp), intent(in) :: x(n)
-      !> Position of node 0 in m, 1/h in 1/m, width of the points in cells.
-      real(wp), intent(in) :: origin, inverse_cell, width
-      integer, intent(in) :: last_base
+      !> Positions and full widths of the points in m. All points of a call have the same width,
+      !> except for cpGIMP.
+      real(wp), intent(in) :: x(n), width(n)
+      type(axis_t), intent(in) :: axis
       integer, intent(inout) :: base(BLOCK)
       real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
     end subroutine axis_weights_interface
@@ -51,30 +69,30 @@ module sg_weighting
 contains
 
   !> uGIMP; see the head of the module.
-  pure subroutine gimp_axis_weights(n, x, origin, inverse_cell, width, last_base, base, s, g)
+  pure subroutine gimp_axis_weights(n, x, width, axis, base, s, g)
     integer, intent(in) :: n
-    real(wp), intent(in) :: x(n)
-    real(wp), intent(in) :: origin, inverse_cell, width
-    integer, intent(in) :: last_base
+    real(wp), intent(in) :: x(n), width(n)
+    type(axis_t), intent(in) :: axis
     integer, intent(inout) :: base(BLOCK)
     real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
-    real(wp) :: half, half_inverse_width, slope, left, f, u, d, s0, s2, g0, g2
+    real(wp) :: w, half, half_inverse_width, slope, left, f, u, d, s0, s2, g0, g2
     integer :: p, k
 
-    half = 0.5_wp*width
-    half_inverse_width = 0.5_wp/width
-    slope = inverse_cell/width
+    w = width(1)*axis%inverse_cell
+    half = 0.5_wp*w
+    half_inverse_width = 0.5_wp/w
+    slope = axis%inverse_cell/w
     !$omp simd private(left, k, f, u, d, s0, s2, g0, g2)
     do p = 1, n
-      left = (x(p) - origin)*inverse_cell - half
-      k = min(max(floor(left), 0), last_base)
+      left = (x(p) - axis%origin)*axis%inverse_cell - half
+      k = min(max(floor(left), 0), axis%last_base)
       f = left - real(k, wp)
-      u = max(0.0_wp, f + width - 1.0_wp)
-      d = max(0.0_wp, 1.0_wp - f - width)
+      u = max(0.0_wp, f + w - 1.0_wp)
+      d = max(0.0_wp, 1.0_wp - f - w)
       s0 = ((1.0_wp - f)*(1.0_wp - f) - d*d)*half_inverse_width
       s2 = u*u*half_inverse_width
       g2 = u*slope
-      g0 = g2 - inverse_cell
+      g0 = g2 - axis%inverse_cell
       base(p) = k
       s(p, 1) = s0
       s(p, 2) = 1.0_wp - s0 - s2
@@ -85,12 +103,44 @@ contains
     end do
   end subroutine gimp_axis_weights
 
-  !> Linear hat functions: the classical MPM. `width` plays no part.
-  pure subroutine linear_axis_weights(n, x, origin, inverse_cell, width, last_base, base, s, g)
+  !> cpGIMP: the width of each point counts, between LEAST_WIDTH and one cell.
+  pure subroutine cpgimp_axis_weights(n, x, width, axis, base, s, g)
     integer, intent(in) :: n
-    real(wp), intent(in) :: x(n)
-    real(wp), intent(in) :: origin, inverse_cell, width
-    integer, intent(in) :: last_base
+    real(wp), intent(in) :: x(n), width(n)
+    type(axis_t), intent(in) :: axis
+    integer, intent(inout) :: base(BLOCK)
+    real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
+    real(wp) :: w, inverse_width, left, f, u, d, s0, s2, g0, g2
+    integer :: p, k
+
+    !$omp simd private(w, inverse_width, left, k, f, u, d, s0, s2, g0, g2)
+    do p = 1, n
+      w = min(max(width(p)*axis%inverse_cell, LEAST_WIDTH), 1.0_wp)
+      inverse_width = 1.0_wp/w
+      left = (x(p) - axis%origin)*axis%inverse_cell - 0.5_wp*w
+      k = min(max(floor(left), 0), axis%last_base)
+      f = left - real(k, wp)
+      u = max(0.0_wp, f + w - 1.0_wp)
+      d = max(0.0_wp, 1.0_wp - f - w)
+      s0 = 0.5_wp*((1.0_wp - f)*(1.0_wp - f) - d*d)*inverse_width
+      s2 = 0.5_wp*u*u*inverse_width
+      g2 = u*axis%inverse_cell*inverse_width
+      g0 = g2 - axis%inverse_cell
+      base(p) = k
+      s(p, 1) = s0
+      s(p, 2) = 1.0_wp - s0 - s2
+      s(p, 3) = s2
+      g(p, 1) = g0
+      g(p, 2) = -(g0 + g2)
+      g(p, 3) = g2
+    end do
+  end subroutine cpgimp_axis_weights
+
+  !> Linear hat functions: the classical MPM. `width` plays no part.
+  pure subroutine linear_axis_weights(n, x, width, axis, base, s, g)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n), width(n)
+    type(axis_t), intent(in) :: axis
     integer, intent(inout) :: base(BLOCK)
     real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
     real(wp) :: xi, f
@@ -98,16 +148,50 @@ contains
 
     !$omp simd private(xi, k, f)
     do p = 1, n
-      xi = (x(p) - origin)*inverse_cell
-      k = min(max(floor(xi), 0), last_base)
+      xi = (x(p) - axis%origin)*axis%inverse_cell
+      k = min(max(floor(xi), 0), axis%last_base)
       f = xi - real(k, wp)
       base(p) = k
       s(p, 1) = 1.0_wp - f
       s(p, 2) = f
       s(p, 3) = 0.0_wp
-      g(p, 1) = -inverse_cell
-      g(p, 2) = inverse_cell
+      g(p, 1) = -axis%inverse_cell
+      g(p, 2) = axis%inverse_cell
       g(p, 3) = 0.0_wp
     end do
   end subroutine linear_axis_weights
+
+  !> Quadratic B-splines, linear within half a cell of a wall; `width` plays no part.
+  pure subroutine bspline_axis_weights(n, x, width, axis, base, s, g)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: x(n), width(n)
+    type(axis_t), intent(in) :: axis
+    integer, intent(inout) :: base(BLOCK)
+    real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
+    real(wp) :: xi, d, s0, s2, g0, g2, linear
+    integer :: p, k
+
+    !$omp simd private(xi, k, d, s0, s2, g0, g2, linear)
+    do p = 1, n
+      xi = (x(p) - axis%origin)*axis%inverse_cell
+      k = min(max(floor(xi - 0.5_wp), 0), axis%last_base)
+      d = xi - real(k + 1, wp)
+      linear = merge(1.0_wp, 0.0_wp, k + 1 == axis%first_wall .or. k + 1 == axis%last_wall)
+      s0 = 0.5_wp*(0.5_wp - d)*(0.5_wp - d)
+      s2 = 0.5_wp*(0.5_wp + d)*(0.5_wp + d)
+      g0 = d - 0.5_wp
+      g2 = d + 0.5_wp
+      s0 = s0 + linear*(max(-d, 0.0_wp) - s0)
+      s2 = s2 + linear*(max(d, 0.0_wp) - s2)
+      g0 = g0 + linear*(merge(-1.0_wp, 0.0_wp, d < 0.0_wp) - g0)
+      g2 = g2 + linear*(merge(0.0_wp, 1.0_wp, d < 0.0_wp) - g2)
+      base(p) = k
+      s(p, 1) = s0
+      s(p, 2) = 1.0_wp - s0 - s2
+      s(p, 3) = s2
+      g(p, 1) = g0*axis%inverse_cell
+      g(p, 2) = -(g0 + g2)*axis%inverse_cell
+      g(p, 3) = g2*axis%inverse_cell
+    end do
+  end subroutine bspline_axis_weights
 end module sg_weighting

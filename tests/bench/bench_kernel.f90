@@ -8,8 +8,7 @@ program bench_kernel
   use sg_config, only: config_t
   use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
-  use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power, update_volume
-  use sg_mohr_coulomb, only: close_gap, return_stress
+  use sg_grid, only: losses_t
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: outcome_t, reset_outcome, STEPS
@@ -18,6 +17,7 @@ program bench_kernel
   use sg_scene, only: build_scene, scene_t
   use sg_simulation, only: simulate, variation_t
   use sg_solver, only: solver_t
+  use sg_stress_update, only: update_stress
   use sg_transfer, only: gather_motion_and_gradient, map_momentum_and_force
   use sg_weighting, only: BLOCK, weights_t
   implicit none
@@ -81,8 +81,8 @@ contains
     integer, parameter :: REPEATS = 200
     type(solver_t) :: solver
     type(weights_t) :: w
-    type(strain_t) :: strain
-    real(wp) :: value(4, BLOCK), gradient(4, BLOCK), ns(5), started, ended, work, damping_work
+    type(losses_t) :: losses
+    real(wp) :: value(4, BLOCK), gradient(4, BLOCK), ns(5), started, ended, work, wave_squared
     character(len=24), parameter :: NAMES(5) = [character(len=24) :: 'weights (twice)', 'gather', &
       'strain and stress', 'map to nodes', 'nodes']
     integer :: repeat, first, last, n, part
@@ -91,13 +91,14 @@ contains
     solver%materials = scene%materials
     solver%particles = scene%particles
     call solver%configure(config)
-    call solver%grid%init(config%grid, 0.0_wp, minval(scene%particles%mass))
+    call solver%grid%init(config%grid, config%boundaries, 0.0_wp, minval(scene%particles%mass))
     call solver%start()
     do n = 1, nint(1.0_wp/scene%first_step)
       call solver%advance(scene%first_step)
     end do
     ns = 0.0_wp
     work = 0.0_wp
+    wave_squared = 0.0_wp
     do part = 1, 5
       call cpu_time(started)
       do repeat = 1, REPEATS
@@ -108,43 +109,29 @@ contains
                      m => solver%materials(solver%particles%bodies(1)%material))
             select case (part)
             case (1)
-              call solver%axis_weights(n, p%x(first:last), g%x_origin, g%inverse_cell, &
-                b%width*g%inverse_cell, &
-                                       g%last_base_x, w%i, w%sx, w%gx)
-              call solver%axis_weights(n, p%y(first:last), g%y_origin, g%inverse_cell, &
-                b%height*g%inverse_cell, &
-                                       g%last_base_y, w%j, w%sy, w%gy)
+              call solver%axis_weights(n, p%x(first:last), p%width(first:last), g%x, w%i, w%sx, &
+                w%gx)
+              call solver%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, &
+                w%gy)
             case (2)
-              call gather_motion_and_gradient(n, w, g%nx, g%ny, g%motion_store(g%motion_start), &
+              call gather_motion_and_gradient(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), &
                 value, gradient)
             case (3)
               gradient = 0.0_wp
-              call find_strain(n, 1.0e-3_wp, gradient, strain)
-              work = work + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
-                p%syy(first:last), &
-                                         p%sxy(first:last))
-              call update_volume(n, strain, p%volume(first:last))
-              call close_gap(n, strain, p%gap(first:last))
-              call predict_stress(n, m%lame, m%shear, strain, p%sxx(first:last), &
-                p%syy(first:last), &
-                                  p%szz(first:last), p%sxy(first:last))
-              call return_stress(n, m, p%sin_friction(first:last), p%cohesion_term(first:last), &
-                                 p%tension_limit(first:last), p%sxx(first:last), &
-                                 p%syy(first:last), &
-                                 p%szz(first:last), p%sxy(first:last), p%gap(first:last))
+              call update_stress(p, m, first, last, 1.0e-3_wp, gradient, work, wave_squared)
             case (4)
               call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), &
                 p%vy(first:last), &
                                           p%volume(first:last), p%sxx(first:last), &
                                           p%syy(first:last), &
-                                          p%sxy(first:last), g%nx, g%ny, &
+                                          p%sxy(first:last), g%x%last, g%y%last, &
                                           g%total_store(g%total_start))
             case default ! the nodes: below, once for all points
             end select
           end associate
         end do
         if (part == 5) call solver%grid%integrate_momentum(1.0e-3_wp, solver%gravity, &
-          solver%damping, damping_work)
+          solver%damping, losses)
       end do
       call cpu_time(ended)
       ns(part) = 1.0e9_wp*(ended - started)/(real(REPEATS, wp)*solver%particles%count)

@@ -85,11 +85,12 @@ contains
   !> of those at the apex.
   !> The plane is done for all points at once; the few on an edge, the cut-off or the apex follow
   !> one by one.
-  pure subroutine return_stress(n, material, sin_friction, cohesion_term, tension_limit, sxx, &
-    syy, szz, sxy, gap)
+  pure subroutine return_stress(n, material, sin_friction, cohesion_term, tension_limit, &
+    sin_dilation, sxx, syy, szz, sxy, gap)
     integer, intent(in) :: n
     type(material_t), intent(in) :: material
-    real(wp), intent(in) :: sin_friction(n), cohesion_term(n), tension_limit(n)
+    !> The last one is the sine of the dilation angle.
+    real(wp), intent(in) :: sin_friction(n), cohesion_term(n), tension_limit(n), sin_dilation(n)
     real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n)
     real(wp), intent(inout) :: gap(n)
     type(principal_t) :: trial
@@ -100,12 +101,13 @@ contains
     real(wp) :: violation(BLOCK)
     integer :: p
 
-    d_middle = 2.0_wp*material%lame*material%sin_dilation
-    d_first = d_middle + 2.0_wp*material%shear*(1.0_wp + material%sin_dilation)
-    d_last = d_middle - 2.0_wp*material%shear*(1.0_wp - material%sin_dilation)
-    friction_part = 4.0_wp*((material%lame + material%shear)*material%sin_dilation)
-    !$omp simd private(centre, high, middle, low, yield, multiplier, new_a, new_b, ratio)
+    !$omp simd private(centre, high, middle, low, yield, multiplier, new_a, new_b, ratio) &
+    !$omp& private(d_first, d_middle, d_last, friction_part)
     do p = 1, n
+      d_middle = 2.0_wp*material%lame*sin_dilation(p)
+      d_first = d_middle + 2.0_wp*material%shear*(1.0_wp + sin_dilation(p))
+      d_last = d_middle - 2.0_wp*material%shear*(1.0_wp - sin_dilation(p))
+      friction_part = 4.0_wp*((material%lame + material%shear)*sin_dilation(p))
       centre = 0.5_wp*(sxx(p) + syy(p))
       trial%half_difference(p) = 0.5_wp*(sxx(p) - syy(p))
       trial%shear_stress(p) = sxy(p)
@@ -134,8 +136,8 @@ contains
 
     do p = 1, n
       if (.not. violation(p) > 0.0_wp) cycle
-      call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p)], &
-        trial, p, stress, opening)
+      call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p), &
+        sin_dilation(p)], trial, p, stress, opening)
       sxx(p) = stress(1)
       syy(p) = stress(2)
       szz(p) = stress(3)
@@ -149,8 +151,8 @@ contains
   !> apex left without stress.
   pure subroutine return_special(material, strength, trial, p, stress, opening)
     type(material_t), intent(in) :: material
-    !> sin(phi), 2 c cos(phi), T
-    real(wp), intent(in) :: strength(3)
+    !> sin(phi), 2 c cos(phi), T, sin(psi)
+    real(wp), intent(in) :: strength(4)
     type(principal_t), intent(in) :: trial
     integer, intent(in) :: p
     real(wp), intent(out) :: stress(4), opening
@@ -180,11 +182,12 @@ contains
   end subroutine return_special
 
   !> Exact return of sorted principal trial stresses `trial` (s1 >= s2 >= s3, Pa) to `returned`; the
-  !> head of the module has the equations. `strength` = sin(phi), 2 c cos(phi) in Pa, T in Pa.
+  !> head of the module has the equations. `strength` = sin(phi), 2 c cos(phi) in Pa, T in Pa,
+  !> sin(psi).
   !> `region`: a REGION_ constant.
   pure subroutine return_principal(material, strength, trial, returned, region)
     type(material_t), intent(in) :: material
-    real(wp), intent(in) :: strength(3), trial(3)
+    real(wp), intent(in) :: strength(4), trial(3)
     real(wp), intent(out) :: returned(3)
     integer, intent(out) :: region
     real(wp) :: normal(3, 6), change(3, 6), excess(6), tolerance
@@ -192,7 +195,7 @@ contains
     logical :: admissible
 
     call define_planes(material, strength, trial, normal, change, excess)
-    tolerance = ROUNDING*(maxval(abs(trial)) + abs(strength(2)) + abs(strength(3)))
+    tolerance = ROUNDING*(maxval(abs(trial)) + abs(strength(2)))
     returned = trial
     region = REGION_ELASTIC
     if (excess(1) <= tolerance .and. excess(4) <= tolerance) return
@@ -252,7 +255,7 @@ contains
   !> F(trial) in Pa.
   pure subroutine define_planes(material, strength, trial, normal, change, excess)
     type(material_t), intent(in) :: material
-    real(wp), intent(in) :: strength(3), trial(3)
+    real(wp), intent(in) :: strength(4), trial(3)
     real(wp), intent(out) :: normal(3, 6), change(3, 6), excess(6)
     real(wp) :: flow(3, 6)
     integer :: k
@@ -262,7 +265,7 @@ contains
     normal([1, 3], 1) = [1.0_wp + strength(1), strength(1) - 1.0_wp]
     normal([1, 2], 2) = normal([1, 3], 1)
     normal([2, 3], 3) = normal([1, 3], 1)
-    flow([1, 3], 1) = [1.0_wp + material%sin_dilation, material%sin_dilation - 1.0_wp]
+    flow([1, 3], 1) = [1.0_wp + strength(4), strength(4) - 1.0_wp]
     flow([1, 2], 2) = flow([1, 3], 1)
     flow([2, 3], 3) = flow([1, 3], 1)
     do k = 1, 3

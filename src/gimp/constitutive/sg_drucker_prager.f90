@@ -1,0 +1,59 @@
+!> Drucker-Prager plasticity with a limit of mean stress: exact return for a whole block at once.
+!>
+!> With q = sqrt(J2) and m = I1/3, tension positive:
+!>   yield    f = q + 3 alpha m - k <= 0,  m <= T
+!>   flow     g = q + 3 alpha_f m on the cone, associated on the limit
+!>   return   q - G l, m - 3 K alpha_f l with l = f/(G + 9 K alpha alpha_f); where that leaves m > T
+!>            (the tip of the cone is such a place): m = T, q = min(q, k - 3 alpha T)
+!> The deviator keeps its direction, so two numbers describe the return, and it is exact. Von Mises
+!> is alpha = alpha_f = 0. At q = 0 on the limit the volumetric strain that makes no stress opens
+!> the gap (see sg_mohr_coulomb).
+module sg_drucker_prager
+  use sg_kinds, only: wp
+  use sg_materials, only: material_t
+  implicit none
+  private
+
+  public :: return_drucker_prager
+
+  !> Guards the division by q, in Pa; where q is 0 so is what it divides.
+  real(wp), parameter :: LEAST_Q = 1.0e-100_wp
+
+contains
+
+  !> Returns the trial stresses of `n` points in place and adds to the gap of those at the tip.
+  pure subroutine return_drucker_prager(n, material, sxx, syy, szz, sxy, gap)
+    integer, intent(in) :: n
+    type(material_t), intent(in) :: material
+    !> Pa; gap is a strain.
+    real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n), gap(n)
+    real(wp) :: mean, dxx, dyy, dzz, q, multiplier, new_mean, new_q, ratio, stiffness, at_limit
+    integer :: p
+    logical :: limited
+
+    stiffness = material%shear + 9.0_wp*material%bulk*material%alpha*material%alpha_flow
+    at_limit = max(material%k - 3.0_wp*material%alpha*material%mean_limit, 0.0_wp)
+    !$omp simd private(mean, dxx, dyy, dzz, q, multiplier, new_mean, new_q, ratio, limited)
+    do p = 1, n
+      mean = (sxx(p) + syy(p) + szz(p))/3.0_wp
+      dxx = sxx(p) - mean
+      dyy = syy(p) - mean
+      dzz = szz(p) - mean
+      q = sqrt(0.5_wp*(dxx*dxx + dyy*dyy + dzz*dzz) + sxy(p)*sxy(p))
+      multiplier = max(q + 3.0_wp*material%alpha*mean - material%k, 0.0_wp)/stiffness
+      new_q = q - material%shear*multiplier
+      new_mean = mean - 3.0_wp*material%bulk*material%alpha_flow*multiplier
+      limited = new_mean > material%mean_limit
+      new_q = merge(min(q, at_limit), new_q, limited)
+      new_mean = min(new_mean, material%mean_limit)
+      ratio = new_q/max(q, LEAST_Q)
+      ! The mean is moved by its change, so that a stress within the cone stays as it is.
+      sxx(p) = mean + ratio*dxx + (new_mean - mean)
+      syy(p) = mean + ratio*dyy + (new_mean - mean)
+      szz(p) = mean + ratio*dzz + (new_mean - mean)
+      sxy(p) = ratio*sxy(p)
+      gap(p) = gap(p) + merge((mean - new_mean)/material%bulk, 0.0_wp, &
+        limited .and. .not. new_q > 0.0_wp)
+    end do
+  end subroutine return_drucker_prager
+end module sg_drucker_prager

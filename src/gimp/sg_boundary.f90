@@ -1,0 +1,158 @@
+!> Conditions on the velocity of nodes: the four walls and boxes of prescribed velocity.
+!>
+!> A wall holds the nodes on and behind it. With v = (v_n, v_t), n pointing into the material:
+!>   held      v = prescribed velocity, in the components that are held (fixed: both, roller: v_n = 0)
+!>   contact   only where the material presses on the wall, v_n < 0: v_n = 0, and friction takes at
+!>             most mu times the normal impulse off v_t (Coulomb; it sticks where that suffices)
+!>
+!> Each condition keeps the impulse it gave (kg/s per metre) and all together the energy they took.
+module sg_boundary
+  use sg_config, only: boundary_config_t, grid_config_t
+  use sg_kinds, only: wp
+  implicit none
+  private
+
+  public :: condition_t, create_wall, create_prescribed, apply_conditions, hold_conditions
+
+  integer, parameter :: KIND_HELD = 1
+  integer, parameter :: KIND_CONTACT = 2
+
+  type :: condition_t
+    integer :: kind = KIND_HELD
+    !> Nodes i_first, i_last, j_first, j_last; none at first.
+    integer :: box(4) = [0, -1, 0, -1]
+    !> Held components and their velocity in m/s.
+    logical :: held(2) = .false.
+    real(wp) :: velocity(2) = 0.0_wp
+    !> Contact: component of the normal, its sign towards the material, Coulomb's coefficient.
+    integer :: normal = 0
+    real(wp) :: sign = 1.0_wp
+    real(wp) :: friction = 0.0_wp
+    !> Not one of the four walls: what it pushes with is reported as reaction.
+    logical :: is_prescribed = .false.
+    !> Momentum given to the nodes in the last step, kg/s.
+    real(wp) :: impulse(2) = 0.0_wp
+  end type condition_t
+
+contains
+
+  !> The wall of the kind `name` over the nodes `box`; `normal` = 1 or 2, `sign` = +1 for the left
+  !> and the lower wall. Nothing is held by a free one.
+  pure function create_wall(name, friction, box, normal, sign) result(wall)
+    character(len=*), intent(in) :: name
+    real(wp), intent(in) :: friction
+    integer, intent(in) :: box(4), normal
+    real(wp), intent(in) :: sign
+    type(condition_t) :: wall
+
+    wall%box = box
+    wall%normal = normal
+    wall%sign = sign
+    select case (name)
+    case ('fixed')
+      wall%held = .true.
+    case ('roller')
+      wall%held(normal) = .true.
+    case ('frictional')
+      wall%kind = KIND_CONTACT
+      wall%friction = friction
+    case default ! free: no node
+      wall%box = [0, -1, 0, -1]
+    end select
+  end function create_wall
+
+  !> Prescribed velocity of the nodes in a box of the case file; `origin` is the place of node (0, 0)
+  !> in m. A node that is outside by less than 1e-6 of a cell counts as inside.
+  pure function create_prescribed(config, origin, cell_size) result(condition)
+    type(boundary_config_t), intent(in) :: config
+    real(wp), intent(in) :: origin(2), cell_size
+    type(condition_t) :: condition
+    real(wp), parameter :: SLACK = 1.0e-6_wp
+
+    condition%is_prescribed = .true.
+    condition%box = [ceiling((config%x_min - origin(1))/cell_size - SLACK), &
+      floor((config%x_max - origin(1))/cell_size + SLACK), &
+      ceiling((config%y_min - origin(2))/cell_size - SLACK), &
+      floor((config%y_max - origin(2))/cell_size + SLACK)]
+    condition%held = [config%components /= 'y', config%components /= 'x']
+    condition%velocity = config%velocity
+  end function create_prescribed
+
+  !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
+  !> mass. `taken`: kinetic energy that the nodes lost to them in this step, J/m.
+  pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
+    type(condition_t), intent(inout) :: conditions(:)
+    !> i_first, i_last, j_first, j_last.
+    integer, intent(in) :: window(4)
+    real(wp), intent(in) :: least_mass
+    integer, intent(in) :: nx, ny
+    real(wp), intent(in) :: total(8, 0:nx, 0:ny)
+    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(out) :: taken
+    real(wp) :: before(2), after(2)
+    integer :: c, i, j
+
+    taken = 0.0_wp
+    do c = 1, size(conditions)
+      associate (this => conditions(c))
+        this%impulse = 0.0_wp
+        do j = max(this%box(3), window(3)), min(this%box(4), window(4))
+          do i = max(this%box(1), window(1)), min(this%box(2), window(2))
+            if (.not. total(1, i, j) > least_mass) cycle
+            before = motion(3:4, i, j)
+            call constrain(this, before, after)
+            motion(3:4, i, j) = after
+            motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
+            this%impulse = this%impulse + total(1, i, j)*(after - before)
+            taken = taken + 0.5_wp*total(1, i, j)*(sum(before**2) - sum(after**2))
+          end do
+        end do
+      end associate
+    end do
+  end subroutine apply_conditions
+
+  !> Velocity of one node after condition `this`.
+  pure subroutine constrain(this, before, after)
+    type(condition_t), intent(in) :: this
+    real(wp), intent(in) :: before(2)
+    real(wp), intent(out) :: after(2)
+    real(wp) :: pressing
+    integer :: tangent
+
+    after = before
+    if (this%kind == KIND_HELD) then
+      where (this%held) after = this%velocity
+    else
+      pressing = max(-this%sign*before(this%normal), 0.0_wp)
+      if (.not. pressing > 0.0_wp) return
+      tangent = 3 - this%normal
+      after(this%normal) = 0.0_wp
+      after(tangent) = sign(max(abs(before(tangent)) - this%friction*pressing, 0.0_wp), &
+        before(tangent))
+    end if
+  end subroutine constrain
+
+  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and no
+  !> motion into a wall with contact. Friction has had its part.
+  pure subroutine hold_conditions(conditions, window, nx, ny, motion)
+    type(condition_t), intent(in) :: conditions(:)
+    integer, intent(in) :: window(4), nx, ny
+    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
+    integer :: c, i, j, k
+
+    do c = 1, size(conditions)
+      associate (this => conditions(c))
+        do j = max(this%box(3), window(3)), min(this%box(4), window(4))
+          do i = max(this%box(1), window(1)), min(this%box(2), window(2))
+            if (this%kind == KIND_CONTACT) then
+              k = 2 + this%normal
+              motion(k, i, j) = this%sign*max(this%sign*motion(k, i, j), 0.0_wp)
+            else
+              where (this%held) motion(3:4, i, j) = this%velocity
+            end if
+          end do
+        end do
+      end associate
+    end do
+  end subroutine hold_conditions
+end module sg_boundary

@@ -1,0 +1,147 @@
+!> Strain, volume and stress of a block of points, whatever their material: the one place that knows
+!> the order of things within the stress update.
+module sg_stress_update
+  use sg_drucker_prager, only: return_drucker_prager
+  use sg_kinds, only: wp
+  use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power, update_volume
+  use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_LINEAR_ELASTIC, &
+    MODEL_MOHR_COULOMB, MODEL_NEO_HOOKEAN
+  use sg_mohr_coulomb, only: close_gap, return_stress
+  use sg_neo_hookean, only: find_neo_hookean_stress, neo_hookean_wave_squared, &
+    update_deformation
+  use sg_particles, only: particles_t
+  use sg_softening, only: plastic_strain_increment, return_softening
+  use sg_weighting, only: BLOCK
+  implicit none
+  private
+
+  public :: update_stress, return_block, wave_speed_squared
+
+contains
+
+  !> Takes the points `first` to `last`, all of one material, one step further. `gradient` of the velocity in
+  !> 1/s. Adds the work of their stresses to `work` (J/m) and raises `wave_squared`, the largest
+  !> squared wave speed, (m/s)^2.
+  subroutine update_stress(particles, material, first, last, time_step, gradient, work, &
+    wave_squared)
+    type(particles_t), intent(inout) :: particles
+    type(material_t), intent(in) :: material
+    integer, intent(in) :: first, last
+    real(wp), intent(in) :: time_step, gradient(4, BLOCK)
+    real(wp), intent(inout) :: work, wave_squared
+    type(strain_t) :: strain
+    real(wp) :: twice
+    integer :: n
+
+    n = last - first + 1
+    associate (p => particles)
+      if (p%has_deformation()) call update_deformation(n, time_step, gradient, &
+        p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), p%fyy(first:last))
+      call find_strain(n, time_step, gradient, strain)
+      twice = stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
+        p%syy(first:last), p%sxy(first:last))
+      if (material%model == MODEL_NEO_HOOKEAN) then
+        call hyperelastic_block(p, material, first, last)
+      else
+        call update_volume(n, strain, p%volume(first:last))
+        if (material%model /= MODEL_LINEAR_ELASTIC) call close_gap(n, strain, p%gap(first:last))
+        call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), &
+          p%syy(first:last), p%szz(first:last), p%sxy(first:last))
+        if (material%model /= MODEL_LINEAR_ELASTIC) call return_block(p, material, first, last)
+      end if
+      twice = twice + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
+        p%syy(first:last), p%sxy(first:last))
+    end associate
+    work = work + 0.5_wp*twice
+    wave_squared = max(wave_squared, wave_speed_squared(particles, material, first, last))
+  end subroutine update_stress
+
+  !> Stress and volume of neo-Hookean points from their deformation gradient.
+  subroutine hyperelastic_block(p, material, first, last)
+    type(particles_t), intent(inout) :: p
+    type(material_t), intent(in) :: material
+    integer, intent(in) :: first, last
+    real(wp) :: stress(BLOCK, 4)
+    integer :: n
+
+    n = last - first + 1
+    call find_neo_hookean_stress(n, material%lame, material%shear, material%density, &
+      p%mass(first:last), p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), &
+      p%fyy(first:last), p%volume(first:last), stress)
+    p%sxx(first:last) = stress(:n, 1)
+    p%syy(first:last) = stress(:n, 2)
+    p%szz(first:last) = stress(:n, 3)
+    p%sxy(first:last) = stress(:n, 4)
+  end subroutine hyperelastic_block
+
+  !> Returns the trial stresses of plastic points to their yield surface.
+  subroutine return_block(p, material, first, last)
+    type(particles_t), intent(inout) :: p
+    type(material_t), intent(in) :: material
+    integer, intent(in) :: first, last
+    real(wp) :: trial(last - first + 1, 4), sin_dilation(last - first + 1)
+    integer :: n
+
+    n = last - first + 1
+    if (material%softens) then
+      call return_softening(n, material, p%friction_angle(first:last), &
+        p%plastic_strain(first:last), p%sxx(first:last), p%syy(first:last), p%szz(first:last), &
+        p%sxy(first:last), p%gap(first:last))
+      return
+    end if
+    if (p%has_plastic_strain()) then
+      trial(:, 1) = p%sxx(first:last)
+      trial(:, 2) = p%syy(first:last)
+      trial(:, 3) = p%szz(first:last)
+      trial(:, 4) = p%sxy(first:last)
+    end if
+    select case (material%model)
+    case (MODEL_MOHR_COULOMB)
+      sin_dilation = material%sin_dilation
+      call return_stress(n, material, p%sin_friction(first:last), p%cohesion_term(first:last), &
+        p%tension_limit(first:last), sin_dilation, p%sxx(first:last), p%syy(first:last), &
+        p%szz(first:last), p%sxy(first:last), p%gap(first:last))
+    case (MODEL_DRUCKER_PRAGER)
+      call return_drucker_prager(n, material, p%sxx(first:last), p%syy(first:last), &
+        p%szz(first:last), p%sxy(first:last), p%gap(first:last))
+    case default ! elastic: nothing to return to
+    end select
+    if (p%has_plastic_strain()) then
+      p%plastic_strain(first:last) = p%plastic_strain(first:last) + plastic_strain_increment(n, &
+        material%shear, trial, p%sxx(first:last), p%syy(first:last), p%szz(first:last), &
+        p%sxy(first:last))
+    end if
+  end subroutine return_block
+
+  !> Square of the largest wave speed in the present state, among points that carry stress, (m/s)^2.
+  function wave_speed_squared(p, material, first, last) result(squared)
+    type(particles_t), intent(in) :: p
+    type(material_t), intent(in) :: material
+    integer, intent(in) :: first, last
+    real(wp) :: squared
+    integer :: n
+
+    n = last - first + 1
+    if (material%model == MODEL_NEO_HOOKEAN) then
+      squared = neo_hookean_wave_squared(n, material%lame, material%shear, material%density, &
+        p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), p%fyy(first:last))
+    else
+      squared = largest_wave_speed(n, material%lame + 2.0_wp*material%shear, &
+        p%volume(first:last), p%mass(first:last), p%gap(first:last))
+    end if
+  end function wave_speed_squared
+
+  !> Square of the largest wave speed, M V/m, among points without a gap, in (m/s)^2.
+  pure function largest_wave_speed(n, modulus, volume, mass, gap) result(squared)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: modulus, volume(n), mass(n), gap(n)
+    real(wp) :: squared
+    integer :: p
+
+    squared = 0.0_wp
+    !$omp simd reduction(max:squared)
+    do p = 1, n
+      squared = max(squared, merge(modulus*volume(p)/mass(p), 0.0_wp, gap(p) <= 0.0_wp))
+    end do
+  end function largest_wave_speed
+end module sg_stress_update
