@@ -49,6 +49,8 @@ module sg_grid
     type(axis_t) :: x, y
     !> The four walls, then the prescribed velocities, applied in this order.
     type(condition_t), allocatable :: conditions(:)
+    !> The last condition is a gate.
+    logical :: has_gate = .false.
     !> Mass below which a node counts as empty, kg/m.
     real(wp) :: least_mass
     !> Storage of the nodes. What counts begins at element `total_start` and `motion_start` on a
@@ -65,6 +67,9 @@ module sg_grid
     procedure :: find_velocity
     procedure :: remap_velocity
     procedure :: reaction
+    procedure :: clear
+    procedure :: set_gate
+    procedure :: open_gate
   end type grid_t
 
 contains
@@ -256,6 +261,32 @@ contains
 
     total(:, window(1):window(2), window(3):window(4)) = 0.0_wp
   end subroutine clear_nodes
+
+  !> Clears the sums of all nodes.
+  subroutine clear(this)
+    class(grid_t), intent(inout) :: this
+
+    this%total_store = 0.0_wp
+    this%window = [0, this%x%last, 0, this%y%last]
+  end subroutine clear
+
+  !> A roller at the line of nodes nearest to `x` (m), which holds all to the right of it too, until
+  !> open_gate.
+  subroutine set_gate(this, x)
+    class(grid_t), intent(inout) :: this
+    real(wp), intent(in) :: x
+
+    this%conditions = [this%conditions, create_wall('roller', 0.0_wp, [nint((x - this%x%origin) &
+      *this%x%inverse_cell), this%x%last, 0, this%y%last], 1, -1.0_wp)]
+    this%has_gate = .true.
+  end subroutine set_gate
+
+  subroutine open_gate(this)
+    class(grid_t), intent(inout) :: this
+
+    if (this%has_gate) this%conditions = this%conditions(:size(this%conditions) - 1)
+    this%has_gate = .false.
+  end subroutine open_gate
 
   !> Force of the prescribed velocities on the material in the last step, in N/m.
   pure function reaction(this, time_step) result(force)

@@ -11,8 +11,13 @@ module sg_observer
   !> One line of the history; units as in `units` of the history group: SI, per metre of thickness.
   type :: history_row_t
     real(wp) :: time, kinetic_energy, elastic_energy, potential_energy
-    !> Work of the stresses not stored as elastic energy, and of the damping, J/m.
-    real(wp) :: dissipated
+    !> Work of the stresses that is not stored as elastic energy; energy taken by damping; by walls
+    !> and prescribed velocities (negative: put in); the sum of the three, J/m.
+    real(wp) :: plastic_work, damping_work, wall_work, dissipated
+    !> As the column energy_error.
+    real(wp) :: energy_error
+    !> Force of the prescribed velocities on the material, N/m.
+    real(wp) :: reaction(2)
     real(wp) :: momentum(2), angular_momentum, centre(2)
     !> Farthest edge, position behind which 99.5 % of the mass lies, highest edge, m.
     real(wp) :: front_max, front_q995, height_max

@@ -4,7 +4,8 @@
 !> material that the random field varies, all bodies where there is none.
 module sg_runout
   use sg_kinds, only: sp, wp
-  use sg_materials, only: material_t
+  use sg_materials, only: material_t, MODEL_NEO_HOOKEAN
+  use sg_neo_hookean, only: neo_hookean_energy
   use sg_particles, only: particles_t
   use sg_sorting, only: sort_index
   implicit none
@@ -114,7 +115,7 @@ contains
     end do
   end function surface_height
 
-  !> Elastic energy of the stresses, sum of V/2 s : C^-1 : s, in J/m.
+  !> Elastic energy in J/m: sum of V/2 s : C^-1 : s, for neo-Hookean points of V_0 W.
   pure function elastic_energy(particles, materials) result(energy)
     type(particles_t), intent(in) :: particles
     type(material_t), intent(in) :: materials(:)
@@ -124,6 +125,14 @@ contains
     energy = 0.0_wp
     do body = 1, size(particles%bodies)
       associate (s => particles, material => materials(particles%bodies(body)%material))
+        if (material%model == MODEL_NEO_HOOKEAN) then
+          associate (first => s%bodies(body)%first, last => s%bodies(body)%last)
+            energy = energy + sum(s%mass(first:last)*neo_hookean_energy(material%lame, &
+              material%shear, s%fxx(first:last), s%fxy(first:last), s%fyx(first:last), &
+              s%fyy(first:last)))/material%density
+          end associate
+          cycle
+        end if
         do p = particles%bodies(body)%first, particles%bodies(body)%last
           trace = s%sxx(p) + s%syy(p) + s%szz(p)
           energy = energy + s%volume(p)*(trace**2/(18.0_wp*material%bulk) &

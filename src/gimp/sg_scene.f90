@@ -1,13 +1,15 @@
 !> A scene: everything that all members of an ensemble share. It is built once and never changes.
 module sg_scene
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use sg_bodies, only: body_extent, fill_body, body_lattice_t
+  use sg_bodies, only: body_lattice_t, fill_body, is_inside
   use sg_config, only: config_t
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_initial_stress, only: set_geostatic_stress
   use sg_kinds, only: wp
+  use sg_manufactured, only: manufactured_velocity
   use sg_materials, only: create_material, material_t, MODEL_MOHR_COULOMB, mohr_coulomb_strength
   use sg_particles, only: particles_t
+  use sg_text, only: to_text
   implicit none
   private
 
@@ -30,6 +32,8 @@ module sg_scene
     real(wp) :: first_step, fixed_step
     !> Centres of the columns of cells, in m, [number of cells along x].
     real(wp), allocatable :: profile_x(:)
+    !> No body is within a cell of the right or the upper wall, which stretched cells move.
+    logical :: is_clear_of_far_walls
   contains
     procedure :: point_count
     procedure :: points_of
@@ -80,7 +84,8 @@ contains
       scene%materials(k) = create_material(config%materials(k))
     end do
     do k = 1, size(config%bodies)
-      call fill_body(config%bodies(k), config%grid%cell_size, lattices(k))
+      call fill_body(config%bodies(k), config%grid%cell_size, lattices(k), error)
+      if (allocated(error)) return
       if (lattices(k)%count == 0) then
         call raise(error, EXIT_BAD_INPUT, &
           'no material point lies in body '//trim(config%bodies(k)%name)// &
@@ -88,6 +93,8 @@ contains
         return
       end if
     end do
+    call refuse_strays(config, lattices, error)
+    if (allocated(error)) return
     count = sum(lattices%count)
     call scene%particles%init(count)
     allocate (scene%particles%bodies(size(lattices)))
@@ -97,13 +104,41 @@ contains
       count = count + lattices(k)%count
     end do
     call set_strength(scene%materials, scene%particles)
-    call measure_scene(config, scene)
+    call measure_scene(config, lattices, scene)
     if (config%loading%initial_stress == 'geostatic') then
       call set_geostatic_stress(scene%particles, scene%materials, config%loading%gravity)
     end if
     columns = nint((config%grid%x_max - config%grid%x_min)/config%grid%cell_size)
     scene%profile_x = [(config%grid%x_min + (k - 0.5_wp)*config%grid%cell_size, k=1, columns)]
   end subroutine build_scene
+
+  !> Points outside the grid would be lost at once; where bodies overlap, mass would count twice.
+  subroutine refuse_strays(config, lattices, error)
+    type(config_t), intent(in) :: config
+    type(body_lattice_t), intent(in) :: lattices(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: a, b, p, number
+
+    do b = 1, size(lattices)
+      associate (l => lattices(b), g => config%grid)
+        number = count(l%x < g%x_min .or. l%x > g%x_max .or. l%y < g%y_min .or. l%y > g%y_max)
+        if (number > 0) then
+          call raise(error, EXIT_BAD_INPUT, to_text(number)//' points of body '// &
+            trim(config%bodies(b)%name)//' lie outside the grid', 'build_scene')
+          return
+        end if
+        do a = 1, size(lattices)
+          if (a == b) cycle
+          number = count([(is_inside(config%bodies(a), l%x(p), l%y(p)), p=1, l%count)])
+          if (number == 0) cycle
+          call raise(error, EXIT_BAD_INPUT, 'bodies '//trim(config%bodies(a)%name)//' and '// &
+            trim(config%bodies(b)%name)//' overlap: '//to_text(number)//' points of the second '// &
+            'lie in the first, and their mass would count twice', 'build_scene')
+          return
+        end do
+      end associate
+    end do
+  end subroutine refuse_strays
 
   !> Puts the points of body `k` into the arrays from `first` on.
   subroutine place_body(config, lattice, k, first, scene)
@@ -130,8 +165,11 @@ contains
       p%y_start(first:last) = lattice%y
       p%width(first:last) = lattice%width
       p%height(first:last) = lattice%height
-      p%vx(first:last) = config%bodies(k)%velocity(1)
-      p%vy(first:last) = config%bodies(k)%velocity(2)
+      p%vx(first:last) = lattice%vx
+      p%vy(first:last) = lattice%vy
+      if (config%loading%body_force == 'manufactured') call manufactured_velocity( &
+        scene%materials(material), config%loading%amplitude, lattice%x, lattice%y, &
+        p%vx(first:last), p%vy(first:last))
       p%volume(first:last) = lattice%width*lattice%height
       p%mass(first:last) = lattice%width*lattice%height*scene%materials(material)%density
       p%friction_angle(first:last) = ieee_value(1.0_wp, ieee_quiet_nan)
@@ -181,27 +219,30 @@ contains
   end subroutine set_strength
 
   !> Extent, mass, speeds and the first time step.
-  subroutine measure_scene(config, scene)
+  subroutine measure_scene(config, lattices, scene)
     type(config_t), intent(in) :: config
+    type(body_lattice_t), intent(in) :: lattices(:)
     type(scene_t), intent(inout) :: scene
     real(wp) :: box(4)
     integer :: k
 
     scene%extent = [huge(1.0_wp), -huge(1.0_wp), huge(1.0_wp), -huge(1.0_wp)]
-    scene%speed = 0.0_wp
+    scene%speed = sqrt(maxval(scene%particles%vx**2 + scene%particles%vy**2))
     scene%wave_speed = 0.0_wp
     do k = 1, size(config%bodies)
-      box = body_extent(config%bodies(k))
+      box = lattices(k)%box
       if (.not. scene%particles%bodies(k)%is_measured) box = scene%extent
       scene%extent(1::2) = min(scene%extent(1::2), box(1::2))
       scene%extent(2::2) = max(scene%extent(2::2), box(2::2))
-      scene%speed = max(scene%speed, norm2(config%bodies(k)%velocity))
       associate (material => scene%materials(config%bodies(k)%material_index))
         scene%wave_speed = max(scene%wave_speed, sqrt((material%lame &
           + 2.0_wp*material%shear)/material%density))
       end associate
     end do
     scene%toe = scene%extent(2)
+    scene%is_clear_of_far_walls = all(scene%particles%x < config%grid%x_max &
+      - config%grid%cell_size) .and. all(scene%particles%y < config%grid%y_max &
+      - config%grid%cell_size)
     scene%mass = sum(scene%particles%mass)
     scene%fixed_step = config%solver%time_step
     scene%first_step = scene%fixed_step

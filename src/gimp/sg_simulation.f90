@@ -6,7 +6,7 @@ module sg_simulation
   use sg_kinds, only: wp
   use sg_initial_stress, only: make_admissible
   use sg_monitor, only: ABANDON, monitor_t, OUT_OF_TIME
-  use sg_observer, only: history_row_t, observer_t
+  use sg_observer, only: blind_observer_t, history_row_t, observer_t
   use sg_outcome, only: ENERGY_ERROR, FAILURE_POINT, FAILURE_STEP, FAILURE_X, FAILURE_Y, &
     FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
@@ -36,6 +36,8 @@ module sg_simulation
     !> says.
     real(wp), allocatable :: friction_angle(:)
     integer :: material = 0
+    !> The run ends after so many steps (the last good state of one that failed).
+    integer :: last_step = huge(1)
   end type variation_t
 
   !> Steps between two questions to the monitor, in points moved: a few milliseconds of work.
@@ -52,6 +54,8 @@ module sg_simulation
   !> "Stays below": for one fundamental period of the body, 4 H/c, so that the turning points of an
   !> elastic oscillation do not pass for rest.
   real(wp), parameter :: SETTLE_PERIODS = 1.0_wp
+  !> Share of the peak of kinetic energy at which a relaxation ends, at the least.
+  real(wp), parameter :: RELAXED = 1.0e-6_wp
 
   !> The clock of a simulation and what it remembers of the past.
   type :: clock_t
@@ -62,7 +66,7 @@ module sg_simulation
     real(wp) :: peak_energy = 0.0_wp, speed_limit = 0.0_wp
     real(wp) :: calm_since = 0.0_wp, calm_needed = 0.0_wp
     real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
-    real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp
+    real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp, elastic_at_start = 0.0_wp
     logical :: settled = .false.
   end type clock_t
 
@@ -81,15 +85,37 @@ contains
     type(solver_t) :: solver
     type(clock_t) :: clock
     real(wp) :: started
-    integer :: steps_per_question
 
     started = wall_seconds()
     call prepare(config, scene, variation, observer, solver)
+    if (config%loading%relaxation /= 'none') call relax(config, scene, variation, monitor, solver, &
+      outcome)
     call start_clock(config, scene, solver, clock)
     if (observer%wants_ends) call show_state(solver, observer, clock)
     call watch(config, solver, observer, clock)
+    call march(config, scene, variation, monitor, observer, solver, clock, outcome)
+    if (outcome%status == STATUS_ABANDONED) return
+    if (observer%wants_ends) call show_state(solver, observer, clock)
+    outcome%values(STEPS) = clock%step
+    if (outcome%status == STATUS_OK) call measure(config, scene, variation, solver, clock, outcome)
+    outcome%values(SECONDS) = wall_seconds() - started
+  end subroutine simulate
+
+  !> Steps until the end, rest or a failure.
+  subroutine march(config, scene, variation, monitor, observer, solver, clock, outcome)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    type(variation_t), intent(in) :: variation
+    class(monitor_t), intent(inout) :: monitor
+    class(observer_t), intent(inout) :: observer
+    type(solver_t), intent(inout) :: solver
+    type(clock_t), intent(inout) :: clock
+    type(outcome_t), intent(inout) :: outcome
+    integer :: steps_per_question
+
     steps_per_question = max(1, POINTS_PER_QUESTION/solver%particles%count)
-    do while (clock%time < config%solver%end_time .and. .not. clock%settled)
+    do while (clock%time < config%solver%end_time .and. .not. clock%settled &
+      .and. clock%step < variation%last_step .and. outcome%status == STATUS_OK)
       clock%time_step = next_step(config, scene, variation, solver, clock)
       call solver%advance(clock%time_step)
       clock%step = clock%step + 1
@@ -99,14 +125,46 @@ contains
       call note_calm(config, solver, clock)
       call watch(config, solver, observer, clock)
       if (mod(clock%step, steps_per_question) == 0) call ask_monitor(monitor, clock, outcome)
-      if (outcome%status /= STATUS_OK) exit
     end do
-    if (outcome%status == STATUS_ABANDONED) return
-    if (observer%wants_ends) call show_state(solver, observer, clock)
-    outcome%values(STEPS) = clock%step
-    if (outcome%status == STATUS_OK) call measure(config, scene, solver, clock, outcome)
-    outcome%values(SECONDS) = wall_seconds() - started
-  end subroutine simulate
+  end subroutine march
+
+  !> The quasi-static stage before time 0: gravity acts on the body under the damping that is critical
+  !> for its slowest wave, 2 omega = pi c/H, held at its toe if it is gated. Ends at rest or after
+  !> relaxation_time; then the points stand still and the gate is gone.
+  subroutine relax(config, scene, variation, monitor, solver, outcome)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    type(variation_t), intent(in) :: variation
+    class(monitor_t), intent(inout) :: monitor
+    type(solver_t), intent(inout) :: solver
+    type(outcome_t), intent(inout) :: outcome
+    type(config_t) :: stage
+    type(variation_t) :: whole
+    type(clock_t) :: clock
+    type(blind_observer_t) :: nobody
+
+    stage = config
+    stage%solver%end_time = config%loading%relaxation_time
+    stage%solver%settle = max(config%solver%settle, RELAXED)
+    whole = variation
+    whole%last_step = huge(1)
+    solver%damping = acos(-1.0_wp)*scene%wave_speed/(scene%extent(4) - scene%extent(3))
+    if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe)
+    call start_clock(stage, scene, solver, clock)
+    call march(stage, scene, whole, monitor, nobody, solver, clock, outcome)
+    if (outcome%status /= STATUS_OK) then
+      if (outcome%status /= STATUS_ABANDONED) outcome%reason = 'before time 0, in the '// &
+        'relaxation: '//outcome%reason
+      outcome%values(FAILURE_STEP) = 0.0_wp
+    end if
+    call solver%grid%open_gate()
+    solver%damping = config%loading%damping
+    solver%particles%vx = 0.0_wp
+    solver%particles%vy = 0.0_wp
+    solver%particles%plastic_strain = 0.0_wp
+    call solver%grid%clear()
+    call solver%start()
+  end subroutine relax
 
   !> Points, strengths, grid and the first mapping.
   subroutine prepare(config, scene, variation, observer, solver)
@@ -147,6 +205,7 @@ contains
     clock%speed_limit = RUNAWAY_FACTOR*(scene%wave_speed + scene%speed + sqrt(2.0_wp*fall))
     clock%potential_at_start = potential_energy(solver%particles, config%loading%gravity)
     clock%energy_at_start = solver%tally%kinetic_energy + clock%potential_at_start
+    clock%elastic_at_start = elastic_energy(solver%particles, solver%materials)
   end subroutine start_clock
 
   !> CFL h/(c + v) with the present wave and point speeds, or the fixed step; never past the end.
@@ -304,7 +363,13 @@ contains
       row%kinetic_energy = solver%tally%kinetic_energy
       row%elastic_energy = elastic_energy(s, solver%materials)
       row%potential_energy = potential_energy(s, config%loading%gravity)
-      row%dissipated = solver%internal_work + solver%damping_work - row%elastic_energy
+      row%plastic_work = solver%internal_work - (row%elastic_energy - clock%elastic_at_start)
+      row%damping_work = solver%damping_work
+      row%wall_work = solver%wall_work
+      row%dissipated = row%plastic_work + row%damping_work + row%wall_work
+      row%energy_error = energy_imbalance(config, solver, clock)
+      row%reaction = 0.0_wp
+      if (clock%step > 0) row%reaction = solver%grid%reaction(clock%time_step)
       row%momentum = [sum(s%mass*s%vx), sum(s%mass*s%vy)]
       row%angular_momentum = angular_momentum(s)
       row%centre = [sum(s%mass*s%x), sum(s%mass*s%y)]/sum(s%mass)
@@ -315,14 +380,31 @@ contains
     end associate
   end function history_row
 
+  !> Energy that appeared from nowhere since the start (negative: vanished): the change of kinetic and
+  !> potential energy, and what stresses, damping and walls took, as a share of the largest of the
+  !> potential energy released, the peak of kinetic energy and the work of forces.
+  function energy_imbalance(config, solver, clock) result(share)
+    type(config_t), intent(in) :: config
+    type(solver_t), intent(in) :: solver
+    type(clock_t), intent(in) :: clock
+    real(wp) :: share, potential, scale
+
+    potential = potential_energy(solver%particles, config%loading%gravity)
+    scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
+      abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
+    share = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
+      + solver%wall_work - solver%force_work - clock%energy_at_start)/scale
+  end function energy_imbalance
+
   !> The columns of a member that ended well.
-  subroutine measure(config, scene, solver, clock, outcome)
+  subroutine measure(config, scene, variation, solver, clock, outcome)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
+    type(variation_t), intent(in) :: variation
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: front(2), potential, scale, point_depth, cell
+    real(wp) :: front(2), point_depth, cell, right_wall
     real(wp), allocatable :: angles(:)
     logical :: touched
 
@@ -333,8 +415,8 @@ contains
       v(RUNOUT_Q99) = front(1) - scene%toe
       v(RUNOUT_Q995) = front(2) - scene%toe
       outcome%height = deposit_depth(s, scene%materials, g%x_min, cell, size(scene%profile_x))
-      ! The depth of a single point in a column of cells: with 2 x 2 points a cell half its height.
-      point_depth = minval(s%bodies%width*s%bodies%height)/cell
+      ! Half the height of a point (CONTRACT; with 2 x 2 points a cell a single one in a column).
+      point_depth = 0.5_wp*minval(s%bodies%height, mask=s%bodies%is_measured)
       v(RUNOUT_CONNECTED) = connected_front(outcome%height, g%x_min, cell, &
                                             scene%extent(1) + 0.5_wp*cell, point_depth) - scene%toe
       v(HEIGHT_MAX) = surface_height(s, -huge(1.0_wp), huge(1.0_wp), g%y_min) - g%y_min
@@ -343,14 +425,12 @@ contains
       if (clock%settled) v(SETTLE_TIME) = clock%calm_since
       v(KINETIC_ENERGY_END) = solver%tally%motion_energy
       v(KINETIC_ENERGY_RATIO) = solver%tally%motion_energy/max(clock%peak_energy, tiny(1.0_wp))
-      touched = scene%extent(2) < g%x_max - cell .and. v(RUNOUT_MAX) + scene%toe > g%x_max - cell
-      touched = touched .or. (scene%extent(1) > g%x_min + cell .and. minval(s%x) < g%x_min + cell)
+      right_wall = g%x_min + (g%x_max - g%x_min)*(1.0_wp + variation%cell_stretch)
+      touched = scene%extent(2) < g%x_max - cell .and. v(RUNOUT_MAX) + scene%toe > right_wall - cell
+      touched = touched .or. (scene%extent(1) > g%x_min + cell .and. minval(s%x, &
+        mask=s%is_measured()) < g%x_min + cell)
       v(WALL_TOUCHED) = merge(1.0_wp, 0.0_wp, touched)
-      potential = potential_energy(s, config%loading%gravity)
-      scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, tiny(1.0_wp))
-      v(ENERGY_ERROR) = (solver%tally%kinetic_energy + potential + solver%internal_work &
-        + solver%damping_work &
-        - clock%energy_at_start)/scale
+      v(ENERGY_ERROR) = energy_imbalance(config, solver, clock)
       v(MASS_ERROR) = sum(s%mass)/scene%mass - 1.0_wp
       angles = pack(s%friction_angle, s%is_measured() .and. ieee_is_finite(s%friction_angle))
       if (size(angles) > 0) then

@@ -10,14 +10,16 @@
 !>
 !> All are made of the same sweep with other parts of it switched on.
 module sg_solver
+  use sg_cell_average, only: cell_average_t
   use sg_config, only: config_t
   use sg_grid, only: grid_t, losses_t, tally_t
   use sg_kinds, only: wp
+  use sg_manufactured, only: manufactured_force
   use sg_materials, only: material_t, MODEL_NEO_HOOKEAN
   use sg_neo_hookean, only: find_stretch
   use sg_particles, only: body_points_t, particles_t
   use sg_stress_update, only: update_stress, wave_speed_squared
-  use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_force, map_momentum, &
+  use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_body_force, map_force, map_momentum, &
     map_momentum_and_force
   use sg_weighting, only: axis_weights_interface, BLOCK, bspline_axis_weights, &
     cpgimp_axis_weights, gimp_axis_weights, linear_axis_weights, weights_t
@@ -40,6 +42,8 @@ module sg_solver
     integer :: move_with = 0
     logical :: map_momentum = .false.
     logical :: map_force = .false.
+    !> Only adds up the volumetric strain rate in the cells (anti-locking).
+    logical :: average_divergence = .false.
   end type sweep_t
 
   type :: solver_t
@@ -50,12 +54,19 @@ module sg_solver
     !> The domains of the points follow their stretch (cpGIMP).
     logical :: stretches_domains = .false.
     type(material_t), allocatable :: materials(:)
+    !> Volumetric strain rates are those of the cells (sg_cell_average).
+    logical :: averages_cells = .false.
+    type(cell_average_t) :: cells
+    !> Amplitude of the manufactured solution in m, 0: none; time in s.
+    real(wp) :: amplitude = 0.0_wp, time = 0.0_wp
     type(grid_t) :: grid
     type(particles_t) :: particles
     !> What the last step found out about the points.
     type(tally_t) :: tally
     !> Work of the stresses, and energy taken by damping and by the walls since the start, J/m.
     real(wp) :: internal_work = 0.0_wp, damping_work = 0.0_wp, wall_work = 0.0_wp
+    !> Work of body forces other than gravity, J/m.
+    real(wp) :: force_work = 0.0_wp
   contains
     procedure :: configure
     procedure :: start
@@ -64,6 +75,8 @@ module sg_solver
     procedure, private :: sweep_block
     procedure, private :: find_weights
     procedure, private :: stretch_domains
+    procedure, private :: average_cells
+    procedure, private :: push_points
     procedure, private :: note_block
   end type solver_t
 
@@ -98,6 +111,8 @@ contains
       call this%particles%track_deformation()
     end if
     if (any(this%materials%softens)) call this%particles%track_plastic_strain()
+    this%averages_cells = config%solver%anti_locking == 'cell_average'
+    if (config%loading%body_force == 'manufactured') this%amplitude = config%loading%amplitude
     this%flip = config%solver%flip
     this%gravity = config%loading%gravity
     this%damping = config%loading%damping
@@ -107,7 +122,9 @@ contains
   subroutine start(this)
     class(solver_t), intent(inout) :: this
 
+    this%time = 0.0_wp
     this%internal_work = 0.0_wp
+    this%force_work = 0.0_wp
     this%damping_work = 0.0_wp
     this%wall_work = 0.0_wp
     call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
@@ -139,20 +156,24 @@ contains
     type(losses_t) :: losses
 
     call this%tally%reset()
+    if (this%scheme /= SCHEME_USF) this%time = this%time + time_step
     select case (this%scheme)
     case (SCHEME_USL)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
+      call this%average_cells()
       call this%sweep_points(sweep_t(update_velocity=.true., update_stress=.true., move_with=3, &
                                      map_momentum=.true., map_force=.true.), time_step)
     case (SCHEME_MUSL)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., map_momentum=.true.), time_step)
       call this%grid%remap_velocity()
+      call this%average_cells()
       call this%sweep_points(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
         map_force=.true.), &
                              time_step)
     case default ! SCHEME_USF
       call this%grid%find_velocity()
+      call this%average_cells()
       call this%sweep_points(sweep_t(update_stress=.true., map_force=.true.), time_step)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., move_with=3, map_momentum=.true.), &
@@ -161,8 +182,18 @@ contains
     this%damping_work = this%damping_work + losses%damping
     this%wall_work = this%wall_work + losses%walls
     this%internal_work = this%internal_work + this%tally%internal_work
+    if (this%scheme == SCHEME_USF) this%time = this%time + time_step
     call this%grid%set_window(this%tally)
   end subroutine advance
+
+  !> The first of two passes over the points where volumetric strain is that of the cells.
+  subroutine average_cells(this)
+    class(solver_t), intent(inout) :: this
+
+    if (.not. this%averages_cells) return
+    call this%cells%clear(this%grid%x, this%grid%y)
+    call this%sweep_points(sweep_t(average_divergence=.true.), 0.0_wp)
+  end subroutine average_cells
 
   !> Goes once over all points.
   subroutine sweep_points(this, sweep, time_step)
@@ -193,16 +224,22 @@ contains
     n = last - first + 1
     associate (p => this%particles, g => this%grid)
       call this%find_weights(first, last, w)
-      if (sweep%update_stress) then
+      if (sweep%update_stress .or. sweep%average_divergence) then
         call gather_motion_and_gradient(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value, &
           gradient)
       else if (sweep%update_velocity) then
         call gather_motion(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value)
       end if
+      if (sweep%average_divergence) then
+        call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), gradient)
+        return
+      end if
       if (sweep%update_velocity) then
         call update_velocity(n, this%flip, value, p%vx(first:last), p%vy(first:last))
       end if
       if (sweep%update_stress) then
+        if (this%averages_cells) call this%cells%replace_divergence(n, p%x(first:last), &
+          p%y(first:last), gradient)
         call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
           this%tally%internal_work, this%tally%wave_squared)
         if (this%stretches_domains) call this%stretch_domains(body, first, last)
@@ -225,8 +262,31 @@ contains
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
                        p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       end if
+      if (sweep%map_force .and. this%amplitude > 0.0_wp) call this%push_points(time_step, &
+        this%materials(body%material), first, last, w)
     end associate
   end subroutine sweep_block
+
+  !> Adds the body force of the manufactured solution to the nodes.
+  subroutine push_points(this, time_step, material, first, last, w)
+    class(solver_t), intent(inout) :: this
+    real(wp), intent(in) :: time_step
+    type(material_t), intent(in) :: material
+    integer, intent(in) :: first, last
+    type(weights_t), intent(in) :: w
+    real(wp) :: bx(BLOCK), by(BLOCK)
+    integer :: n
+
+    n = last - first + 1
+    associate (p => this%particles, g => this%grid)
+      call manufactured_force(n, material, this%amplitude, this%time, p%x_start(first:last), &
+        p%y_start(first:last), bx, by)
+      call map_body_force(n, w, p%mass(first:last), bx, by, g%x%last, g%y%last, &
+        g%total_store(g%total_start))
+      this%force_work = this%force_work + time_step*sum(p%mass(first:last)*(p%vx(first:last) &
+        *bx(:n) + p%vy(first:last)*by(:n)))
+    end associate
+  end subroutine push_points
 
   !> Weights of the points `first` to `last` at their present place.
   pure subroutine find_weights(this, first, last, w)

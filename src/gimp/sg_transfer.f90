@@ -19,7 +19,7 @@ module sg_transfer
   implicit none
   private
 
-  public :: map_momentum, map_force, map_momentum_and_force, gather_motion, &
+  public :: map_momentum, map_force, map_momentum_and_force, map_body_force, gather_motion, &
     gather_motion_and_gradient
 
 contains
@@ -120,6 +120,26 @@ contains
       end do
     end do
   end subroutine map_momentum_and_force
+
+  !> f_i += S m_p b_p for forces per mass `bx`, `by` in m/s^2.
+  pure subroutine map_body_force(n, w, mass, bx, by, nx, ny, total)
+    integer, intent(in) :: n
+    type(weights_t), intent(in) :: w
+    real(wp), intent(in) :: mass(n), bx(BLOCK), by(BLOCK)
+    integer, intent(in) :: nx, ny
+    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    integer :: p, i, j, node
+
+    do p = 1, n
+      do j = 1, 3
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
+        do i = 1, 3
+          total(5:6, node + i) = total(5:6, node + i) + w%sx(p, i)*w%sy(p, j)*mass(p)*[bx(p), &
+            by(p)]
+        end do
+      end do
+    end do
+  end subroutine map_body_force
 
   !> What S_x S_y multiplies in the first half of a node.
   pure subroutine pack_momentum(n, mass, vx, vy, a)

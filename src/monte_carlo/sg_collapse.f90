@@ -8,8 +8,11 @@ module sg_collapse
   use sg_member_model, only: member_model_t
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
-  use sg_outcome, only: FIELD_CLIPPED, outcome_t, reset_outcome, STATUS_ABANDONED, &
-    STATUS_FIELD_FAILED
+  use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, outcome_t, reset_outcome, STATUS_ABANDONED, &
+    STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, status_text
+  use sg_posix, only: make_directory, write_file
+  use sg_resolved, only: resolved_text
+  use sg_snapshot, only: snapshot_name
   use sg_philox, only: FIELD_STREAM, fill_uniform, NOISE_STREAM
   use sg_plan, only: plan_t
   use sg_random_field, only: random_field_t
@@ -46,6 +49,7 @@ module sg_collapse
     procedure, private :: vary_homogeneous
     procedure, private :: vary_by_field
     procedure, private :: is_recorded
+    procedure, private :: keep_capsule
   end type collapse_model_t
 
 contains
@@ -121,16 +125,61 @@ contains
         call recorder%open(output%directory, trim(this%plan%cases(case_index)%label), id, &
                            output%snapshot_interval, output%history_interval, error)
       end associate
-      if (.not. allocated(error)) then
+      if (allocated(error)) then
+        call simulate(this%config, this%scene, variation, monitor, nobody, outcome)
+      else
         call simulate(this%config, this%scene, variation, monitor, recorder, outcome)
         if (outcome%status /= STATUS_ABANDONED) call recorder%close(error)
       end if
-      if (allocated(error)) outcome%reason = 'snapshots not written: '//error%message
+      if (allocated(error) .and. outcome%status == STATUS_OK) outcome%reason = &
+        'snapshots not written: '//error%message
     else
       call simulate(this%config, this%scene, variation, monitor, nobody, outcome)
     end if
+    if (outcome%values(FAILURE_STEP) > 0.0_wp .and. .not. this%record_nothing) then
+      call this%keep_capsule(case_index, id, variation, monitor, outcome)
+    end if
     outcome%values(FIELD_CLIPPED) = clipped
   end subroutine run_collapse
+
+  !> What a failed member leaves in DIR/failures: its first and its last good state (the step before
+  !> the failure, computed again), and a case file that replays it. A capsule that cannot be written
+  !> is told in the reason and hides nothing.
+  subroutine keep_capsule(this, case_index, id, variation, monitor, outcome)
+    class(collapse_model_t), intent(in) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+    type(variation_t), intent(in) :: variation
+    class(monitor_t), intent(inout) :: monitor
+    type(outcome_t), intent(inout) :: outcome
+    type(variation_t) :: shortened
+    type(recorder_t) :: recorder
+    type(outcome_t) :: again
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: label, path
+
+    if (outcome%status == STATUS_TIME_LIMIT) return
+    label = trim(this%plan%cases(case_index)%label)
+    associate (output => this%config%output)
+      path = trim(output%directory)//'/failures/'//snapshot_name(label, id)
+      call recorder%open(output%directory, label, id, 0.0_wp, 0.0_wp, error, 'failures')
+      if (.not. allocated(error)) then
+        shortened = variation
+        shortened%last_step = nint(outcome%values(FAILURE_STEP)) - 1
+        call reset_outcome(again, case_index, id, size(this%scene%profile_x))
+        call simulate(this%config, this%scene, shortened, monitor, recorder, again)
+        if (again%status == STATUS_ABANDONED) return
+        call recorder%close(error)
+      end if
+      if (.not. allocated(error)) call write_file(path//'.nml', '! Member '//to_text(id)//' of '// &
+        label//' failed ('//status_text(outcome%status)//') in step '// &
+        to_text(nint(outcome%values(FAILURE_STEP)))//': '//outcome%reason//new_line('a')// &
+        '! Replay: sgimp THIS_FILE --realization '//to_text(id)//' --study-case '//label// &
+        ' --snapshots --output DIR'//new_line('a')//resolved_text(this%config), error)
+    end associate
+    if (allocated(error)) outcome%reason = outcome%reason//' (capsule not written: '// &
+      error%message//')'
+  end subroutine keep_capsule
 
   !> Member 1 is nominal, the others differ by what means nothing. With a random field, the
   !> strength is its mean.
@@ -146,8 +195,8 @@ contains
     if (id > 1) then
       call fill_uniform(this%config%monte_carlo%seed, NOISE_STREAM, id, 0_i8, u)
       variation%step_factor = 1.0_wp + STEP_SPREAD*(2.0_wp*u(1) - 1.0_wp)
-      variation%cell_stretch = u(2)*this%config%grid%cell_size/(this%scene%extent(2) &
-        - this%config%grid%x_min)
+      if (this%scene%is_clear_of_far_walls) variation%cell_stretch = u(2) &
+        *this%config%grid%cell_size/(this%scene%extent(2) - this%config%grid%x_min)
       friction = 1.0_wp + FRICTION_SPREAD*(2.0_wp*u(3) - 1.0_wp)
     end if
     material = this%config%bodies(1)%material_index
@@ -201,6 +250,7 @@ contains
         recorded = recorded .or. output%snapshot_interval > 0.0_wp &
           .or. output%history_interval > 0.0_wp
       end if
+      recorded = recorded .and. .not. this%record_nothing
     end associate
   end function is_recorded
 end module sg_collapse

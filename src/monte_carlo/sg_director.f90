@@ -65,8 +65,12 @@ contains
     if (allocated(this%error)) return
     call this%keep(outcome)
     this%fresh = this%fresh + 1
-    if (outcome%status == STATUS_OK) return
+    if (outcome%status == STATUS_OK .and. outcome%reason == '') return
     associate (label => this%results(outcome%case_index)%label)
+      if (outcome%status == STATUS_OK) then
+        call this%progress%say('member '//to_text(outcome%id)//' of '//label//': '//outcome%reason)
+        return
+      end if
       call this%progress%say('member '//to_text(outcome%id)//' of '//label//' failed ('// &
         status_text(outcome%status)//'): '//outcome%reason)
       call this%progress%tell('member_failed', '"case":'//json_text(label)//',"id":'// &

@@ -102,13 +102,22 @@ contains
     integer(i8), intent(out) :: mark
     type(error_t), allocatable, intent(out) :: error
     character(len=8) :: signature_found
+    type(outcome_t), allocatable :: found(:)
+    type(damage_t), allocatable :: holes(:)
     integer(i4) :: numbers(5)
 
     mark = 0
-    if (size(bytes) < HEADER) return
-    signature_found = transfer(bytes(:8), signature_found)
+    signature_found = SIGNATURE
+    if (size(bytes) > 0) signature_found(:min(8, size(bytes))) = transfer(bytes(:min(8, &
+      size(bytes))), repeat(' ', min(8, size(bytes))))
+    if (signature_found /= SIGNATURE) then
+      call raise(error, EXIT_BAD_INPUT, JOURNAL_NAME//' is no journal of this program; '// &
+        '--overwrite starts anew', 'journal_t%load')
+      return
+    end if
+    if (size(bytes, kind=i8) < HEADER) return
     numbers = transfer(bytes(9:HEADER), numbers)
-    if (signature_found /= SIGNATURE .or. numbers(2) /= BYTE_ORDER) then
+    if (numbers(2) /= BYTE_ORDER) then
       call raise(error, EXIT_BAD_INPUT, JOURNAL_NAME// &
         ' is no journal of this program on such a '// &
         'machine; --overwrite starts anew', 'journal_t%load')
@@ -116,7 +125,11 @@ contains
       call raise(error, EXIT_BAD_INPUT, JOURNAL_NAME//' is of another version of the program; '// &
         '--overwrite starts anew', 'journal_t%load')
     else if (numbers(4) < 0 .or. size(bytes, kind=i8) < HEADER + int(numbers(4), i8)) then
-      return
+      ! Cut off while it was written, if no record follows; otherwise its length is damaged.
+      allocate (found(0), holes(0))
+      call scan_records(bytes, int(HEADER, i8), found, holes)
+      if (size(found) > 0) call raise(error, EXIT_BAD_INPUT, 'the header of '//JOURNAL_NAME// &
+        ' is damaged, but records follow it; --overwrite starts anew', 'journal_t%load')
     else if (checksum(bytes(HEADER + 1:HEADER + numbers(4))) /= numbers(5)) then
       call raise(error, EXIT_BAD_INPUT, 'the header of '//JOURNAL_NAME//' is damaged; '// &
         '--overwrite starts anew', 'journal_t%load')

@@ -27,12 +27,15 @@ contains
 
   !> Begins the record of member `id` of the case `label` in the run directory. Intervals in s, 0
   !> for none.
-  subroutine open_record(this, directory, label, id, snapshot_interval, history_interval, error)
+  !> `folder`: of the run directory, where the file goes; snapshots if absent.
+  subroutine open_record(this, directory, label, id, snapshot_interval, history_interval, error, &
+    folder)
     class(recorder_t), intent(inout) :: this
     character(len=*), intent(in) :: directory, label
     integer(i8), intent(in) :: id
     real(wp), intent(in) :: snapshot_interval, history_interval
     type(error_t), allocatable, intent(out) :: error
+    character(len=*), intent(in), optional :: folder
 
     this%wants_ends = .true.
     this%wants_plastic_strain = .true.
@@ -40,7 +43,11 @@ contains
     this%history_interval = history_interval
     allocate (this%rows(64))
     this%row_count = 0
-    call this%file%open(directory, label, id, error)
+    if (present(folder)) then
+      call this%file%open(directory, folder, label, id, error)
+    else
+      call this%file%open(directory, 'snapshots', label, id, error)
+    end if
   end subroutine open_record
 
   subroutine note_history(this, row)
@@ -97,14 +104,20 @@ contains
         history%elastic_energy = rows%elastic_energy
         history%potential_energy = rows%potential_energy
         history%dissipated = rows%dissipated
+        history%plastic_work = rows%plastic_work
+        history%damping_work = rows%damping_work
+        history%wall_work = rows%wall_work
+        history%energy_error = rows%energy_error
         history%angular_momentum = rows%angular_momentum
         history%front_max = rows%front_max
         history%front_q995 = rows%front_q995
         history%height_max = rows%height_max
         allocate (history%momentum(2, this%row_count), history%centre(2, this%row_count))
+        allocate (history%reaction(2, this%row_count))
         do k = 1, this%row_count
           history%momentum(:, k) = rows(k)%momentum
           history%centre(:, k) = rows(k)%centre
+          history%reaction(:, k) = rows(k)%reaction
         end do
       end associate
       call this%file%add_history(history)

@@ -34,6 +34,10 @@ module sg_snapshot
     real(wp), allocatable :: dissipated(:), angular_momentum(:)
     !> [2, n]
     real(wp), allocatable :: momentum(:, :), centre(:, :)
+    !> [2, n] force of prescribed velocities on the material, N/m
+    real(wp), allocatable :: reaction(:, :)
+    !> [n] energy taken by plastic flow, damping and walls, J/m; energy_error is a share
+    real(wp), allocatable :: plastic_work(:), damping_work(:), wall_work(:), energy_error(:)
     !> [n]
     real(wp), allocatable :: front_max(:), front_q995(:), height_max(:)
   end type history_t
@@ -67,14 +71,14 @@ contains
     name = trim(label)//'_r'//trim(digits)
   end function snapshot_name
 
-  !> Begins the file of a member in `run_directory`/snapshots, which is made if need be.
-  subroutine open (this, run_directory, label, id, error)
+  !> Begins the file of a member in `run_directory`/`folder`, which is made if need be.
+  subroutine open (this, run_directory, folder, label, id, error)
     class(snapshot_t), intent(inout) :: this
-    character(len=*), intent(in) :: run_directory, label
+    character(len=*), intent(in) :: run_directory, folder, label
     integer(i8), intent(in) :: id
     type(error_t), allocatable, intent(out) :: error
 
-    this%directory = trim(run_directory)//'/snapshots/'
+    this%directory = trim(run_directory)//'/'//folder//'/'
     this%name = snapshot_name(label, id)
     this%grids = ''
     call make_directory(this%directory, error)
@@ -117,6 +121,11 @@ contains
     call this%file%write('/history/elastic_energy', history%elastic_energy, 'J/m')
     call this%file%write('/history/potential_energy', history%potential_energy, 'J/m')
     call this%file%write('/history/dissipated', history%dissipated, 'J/m')
+    call this%file%write('/history/plastic_work', history%plastic_work, 'J/m')
+    call this%file%write('/history/damping_work', history%damping_work, 'J/m')
+    call this%file%write('/history/wall_work', history%wall_work, 'J/m')
+    call this%file%write('/history/energy_error', history%energy_error, '1')
+    call this%file%write('/history/reaction', history%reaction, 'N/m')
     call this%file%write('/history/momentum', history%momentum, 'kg/s')
     call this%file%write('/history/angular_momentum', history%angular_momentum, 'kg m/s')
     call this%file%write('/history/centre', history%centre, 'm')

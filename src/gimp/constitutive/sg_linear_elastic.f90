@@ -84,7 +84,7 @@ contains
     end do
   end subroutine predict_stress
 
-  !> Sum over points of V sigma : strain increment, in J/m.
+  !> Sum over points of V sigma : strain increment, in J/m, for the share of it that meets stress.
   pure function stress_power(n, strain, volume, sxx, syy, sxy) result(work)
     integer, intent(in) :: n
     type(strain_t), intent(in) :: strain
@@ -95,7 +95,7 @@ contains
     work = 0.0_wp
     !$omp simd reduction(+:work)
     do p = 1, n
-      work = work + volume(p)*(sxx(p)*strain%exx(p) + syy(p)*strain%eyy(p) &
+      work = work + strain%share(p)*volume(p)*(sxx(p)*strain%exx(p) + syy(p)*strain%eyy(p) &
         + 2.0_wp*sxy(p)*strain%exy(p))
     end do
   end function stress_power
