@@ -30,7 +30,7 @@ def as_text(value):
         return f"'{value}'"
     if isinstance(value, (list, tuple)):
         return ", ".join(as_text(part) for part in value)
-    return repr(value)
+    return repr(value.item() if isinstance(value, np.generic) else value)
 
 
 def change_keys(groups, changes):
