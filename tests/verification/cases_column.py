@@ -55,6 +55,21 @@ def self_weight_column(bench):
     yield at_most("linear: order of the mean stress error", 0.2, order_of(sizes[1:], linear), why)
 
 
+def bar(bench):
+    """Case 8."""
+    for w in ("linear", "gimp", "cpgimp", "bspline"):
+        for sch in ("usf", "usl", "musl"):
+            result = bench.run("bar", {"solver.weighting": w, "solver.scheme": sch})
+            h = result.history
+            t, v, c = h["time"], h["momentum"][:, 0] / 25.0, h["centre"][:, 0] - 12.5
+            k = np.flatnonzero((c[:-1] < 0.0) & (c[1:] >= 0.0))
+            inst = t[k] - c[k] * (t[k + 1] - t[k]) / (c[k + 1] - c[k])
+            e = h["kinetic_energy"] + h["elastic_energy"]
+            print(w, sch, h["kinetic_energy"][0], "period", (inst[-1] - inst[0]) / (len(inst) - 1) / 10.0, "v", v[0], v.max(),
+                  v.min(), "u", c.max(), c.min(), "e", e[-1] / e[0] - 1, abs(e / e[0] - 1).max(), result.row["energy_error"])
+    yield close("x", 1.0, 1.0, 1.0, "")
+
+
 def gravity_oscillation(bench):
     """Case 10: period 4 L/c = 0.40117 s within 1 %, top between 0 and twice the settlement within 2 %.
 

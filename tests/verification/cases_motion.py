@@ -6,7 +6,7 @@ import numpy as np
 from judge import close, small
 
 SCHEMES = ("usf", "usl", "musl")
-WEIGHTINGS = ("linear", "gimp")
+WEIGHTINGS = ("linear", "gimp", "cpgimp", "bspline")
 
 
 def worst(values):
@@ -50,6 +50,31 @@ def flying_disc(bench):
     yield small("largest stress, Pa, over E", max(stresses), 1e6, 4e-15, why)
     why = "sums over 804 points, each with a rounding of 1e-16"
     yield small("change of momentum, kg/s", worst(changes), np.abs(momentum[0]).max(), 1e-13, why)
+
+
+def affine(bench):
+    """Case 6, affine field: one step; points two cells and more from the edge of the block."""
+    step, lame, shear = 1e-3, 1e6 * 0.3 / (1.3 * 0.4), 1e6 / 2.6
+    strain = np.array([0.3, 0.1, 0.0, 0.15]) * step
+    exact = lame * (strain[0] + strain[1]) * np.array([1.0, 1.0, 1.0, 0.0]) + 2.0 * shear * strain
+    errors = []
+    for weighting, scheme in itertools.product(WEIGHTINGS, SCHEMES):
+        result = bench.run("affine", {"solver.weighting": weighting, "solver.scheme": scheme})
+        place = result.first.position
+        inside = (np.abs(place - 2.0) < 0.5).all(axis=1)
+        errors.append(np.abs(result.last.stress[inside] - exact).max())
+        print(weighting, scheme, errors[-1] / exact.max(), inside.sum())
+    why = "rounding: velocities of 2 m/s differ by 0.1 m/s from node to node"
+    yield small("stress less D : strain, Pa, over s_xx", max(errors), exact[0], 1e-12, why)
+
+
+def spinning_disc(bench):
+    """Case 6, rotation: three turns."""
+    for weighting, scheme in itertools.product(WEIGHTINGS, SCHEMES):
+        history = bench.run("spinning_disc", {"solver.weighting": weighting, "solver.scheme": scheme}).history
+        spin = history["angular_momentum"]
+        print(weighting, scheme, spin[0], spin[-1] / spin[0] - 1.0, history["kinetic_energy"][[0,-1]],history["elastic_energy"][[0,-1]])
+    yield close("angular momentum at the start", 0.5 * 1000 * np.pi, spin[0], 1e-2, "area")
 
 
 def two_discs(bench):

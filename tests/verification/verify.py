@@ -12,18 +12,26 @@ from pathlib import Path
 
 import cases_column
 import cases_motion
+import cases_strength
 from runner import Bench
 
 # Number in the list of demands, and the function that runs the case and judges it.
 CASES = {
+    "element_compression": (2, cases_strength.element_compression),
+    "element_extension": (2, cases_strength.element_extension),
+    "element_unconfined": (2, cases_strength.element_unconfined),
+    "cones": (3, cases_strength.cones),
     "free_fall": (4, cases_motion.free_fall),
+    "affine": (6, cases_motion.affine),
+    "spinning_disc": (6, cases_motion.spinning_disc),
+    "bar": (8, cases_column.bar),
     "flying_disc": (6, cases_motion.flying_disc),
     "self_weight_column": (9, cases_column.self_weight_column),
     "gravity_oscillation": (10, cases_column.gravity_oscillation),
     "two_discs": (11, cases_motion.two_discs),
 }
 
-HEAD = "| case | quantity | reference | ours | error | allowed | why | command |\n|---|---|---|---|---|---|---|---|"
+COLUMNS = ("case", "quantity", "reference", "ours", "error", "allowed", "why", "command")
 
 
 def main():
@@ -36,7 +44,7 @@ def main():
     options = parser.parse_args()
     missed = 0
     if options.table:
-        print(HEAD)
+        print("|", " | ".join(COLUMNS), "|\n" + "|---" * len(COLUMNS) + "|")
     for case in options.case or CASES:
         number, judge = CASES[case]
         with tempfile.TemporaryDirectory() as scratch:
