@@ -11,6 +11,8 @@ import tempfile
 from pathlib import Path
 
 import cases_column
+import cases_footing
+import cases_manufactured
 import cases_motion
 import cases_strength
 from runner import Bench
@@ -24,11 +26,13 @@ CASES = {
     "free_fall": (4, cases_motion.free_fall),
     "affine": (6, cases_motion.affine),
     "spinning_disc": (6, cases_motion.spinning_disc),
+    "manufactured": (7, cases_manufactured.manufactured),
     "bar": (8, cases_column.bar),
     "flying_disc": (6, cases_motion.flying_disc),
     "self_weight_column": (9, cases_column.self_weight_column),
     "gravity_oscillation": (10, cases_column.gravity_oscillation),
     "two_discs": (11, cases_motion.two_discs),
+    "footing": (15, cases_footing.footing),
 }
 
 COLUMNS = ("case", "quantity", "reference", "ours", "error", "allowed", "why", "command")
