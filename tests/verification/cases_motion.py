@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from judge import close, small
+from judge import close, note, small
 
 SCHEMES = ("usf", "usl", "musl")
 WEIGHTINGS = ("linear", "gimp", "cpgimp", "bspline")
@@ -53,54 +53,57 @@ def flying_disc(bench):
 
 
 def affine(bench):
-    """Case 6, affine field: one step; points two cells and more from the edge of the block."""
+    """Case 6, affine field: one step; points three cells and more from the edge of the block, whose nodes have
+    points all around with every weighting."""
     step, lame, shear = 1e-3, 1e6 * 0.3 / (1.3 * 0.4), 1e6 / 2.6
     strain = np.array([0.3, 0.1, 0.0, 0.15]) * step
     exact = lame * (strain[0] + strain[1]) * np.array([1.0, 1.0, 1.0, 0.0]) + 2.0 * shear * strain
     errors = []
     for weighting, scheme in itertools.product(WEIGHTINGS, SCHEMES):
         result = bench.run("affine", {"solver.weighting": weighting, "solver.scheme": scheme})
-        place = result.first.position
-        inside = (np.abs(place - 2.0) < 0.5).all(axis=1)
+        inside = (np.abs(result.first.position - 2.0) < 0.25).all(axis=1)
         errors.append(np.abs(result.last.stress[inside] - exact).max())
-        print(weighting, scheme, errors[-1] / exact.max(), inside.sum())
-    why = "rounding: velocities of 2 m/s differ by 0.1 m/s from node to node"
-    yield small("stress less D : strain, Pa, over s_xx", max(errors), exact[0], 1e-12, why)
+    why = (
+        "velocities of 2 m/s, with roundings of 4e-16, differ by 0.1 m/s from node to node; some 50 roundings"
+    )
+    yield small("stress less D : strain, Pa, over s_xx", max(errors), exact[0], 2e-13, why)
 
 
 def spinning_disc(bench):
-    """Case 6, rotation: three turns."""
-    for weighting, scheme in itertools.product(WEIGHTINGS, SCHEMES):
-        history = bench.run("spinning_disc", {"solver.weighting": weighting, "solver.scheme": scheme}).history
-        spin = history["angular_momentum"]
-        print(weighting, scheme, spin[0], spin[-1] / spin[0] - 1.0, history["kinetic_energy"][[0,-1]],history["elastic_energy"][[0,-1]])
-    yield close("angular momentum at the start", 0.5 * 1000 * np.pi, spin[0], 1e-2, "area")
+    """Case 6, rotation: one turn. What FLIP loses is second order in the size of a cell."""
+    drift = {}
+    for scheme, size in (("usl", 0.1), ("usl", 0.05), ("musl", 0.05)):
+        changes = {"solver.scheme": scheme, "grid.cell_size": size}
+        spin = bench.run("spinning_disc", changes).history["angular_momentum"]
+        drift[scheme, size] = spin[-1] / spin[0] - 1.0
+    exact = 0.5 * 1000.0 * np.pi
+    yield close(
+        "angular momentum at the start, kg m/s", exact, spin[0], 4e-3, "twice the error of the area, 0.2 %"
+    )
+    yield small("drift in a turn, usl, 20 cells a radius", drift["usl", 0.05], 1.0, 0.01, "demand 1 % a turn")
+    yield small(
+        "drift in a turn, musl, 20 cells a radius", drift["musl", 0.05], 1.0, 0.01, "demand 1 % a turn"
+    )
+    yield note("drift in a turn, usl, 10 cells a radius", drift["usl", 0.1], "too coarse for 1 %")
 
 
 def two_discs(bench):
-    """Case 11. Rate-form elasticity has no energy function: at the turning point, 12 % strain, the energy read off
-    the stresses differs from the work done; what is kept throughout is kinetic energy plus that work."""
+    """Case 11, neo-Hookean: kinetic and elastic energy together are kept. Rate-form elasticity has no energy
+    function: with it the energy read off the stresses differs from the work done while the discs are squeezed."""
     history = bench.run("two_discs").history
     kinetic, energy = history["kinetic_energy"], history["kinetic_energy"] + history["elastic_energy"]
-    balance = energy + history["dissipated"]
-    largest = 1000.0 * 0.04 * np.pi * np.hypot(0.1, 0.1)
-    yield close(
-        "kinetic energy at the start, J/m", 2.513274, kinetic[0], 1e-3, "area of a disc made of squares"
-    )
-    yield small(
-        "momentum, kg/s",
-        worst(history["momentum"].ravel()),
-        largest,
-        1e-12,
-        "demand: rounding, of one disc's",
-    )
-    yield close(
-        "kinetic energy + work of stresses, worst",
-        energy[0],
-        worst(balance - balance[0]) + balance[0],
-        1e-2,
-        "demand: total energy 1 %",
-    )
-    yield close(
-        "kinetic + elastic energy after separation", energy[0], energy[-1], 1e-2, "demand: total energy 1 %"
+    momentum = 1000.0 * 0.04 * np.pi * np.hypot(0.1, 0.1)
+    why = "area of a disc made of squares, 0.02 %"
+    yield close("kinetic energy at the start, J/m", 2.513274, kinetic[0], 1e-3, why)
+    why = "demand: rounding, of the momentum of one disc"
+    yield small("momentum, kg/s", worst(history["momentum"].ravel()), momentum, 1e-12, why)
+    why = "demand 1 %"
+    yield small("change of total energy, worst, J/m", worst(energy - energy[0]), energy[0], 1e-2, why)
+    yield small("change of total energy after parting, J/m", energy[-1] - energy[0], energy[0], 1e-2, why)
+    yield note("least kinetic energy, J/m", kinetic.min(), "at the turning point: the rest is elastic")
+    yield note("kinetic energy after parting, J/m", kinetic[-1], "the rest stays in vibration of the discs")
+    rate = bench.run("two_discs", {"material.model": "linear_elastic"}).history
+    total = rate["kinetic_energy"] + rate["elastic_energy"]
+    yield note(
+        "rate form: change of total energy, worst, share", worst(total / total[0] - 1.0), "no energy function"
     )

@@ -10,10 +10,12 @@ import sys
 import tempfile
 from pathlib import Path
 
+import cases_beam
 import cases_column
 import cases_footing
 import cases_manufactured
 import cases_motion
+import cases_slope
 import cases_strength
 from runner import Bench
 
@@ -32,6 +34,9 @@ CASES = {
     "self_weight_column": (9, cases_column.self_weight_column),
     "gravity_oscillation": (10, cases_column.gravity_oscillation),
     "two_discs": (11, cases_motion.two_discs),
+    "frictional_plane": (12, cases_slope.frictional_plane),
+    "infinite_slope": (13, cases_slope.infinite_slope),
+    "cantilever": (14, cases_beam.cantilever),
     "footing": (15, cases_footing.footing),
 }
 
