@@ -90,6 +90,10 @@ contains
     call prepare(config, scene, variation, observer, solver)
     if (config%loading%relaxation /= 'none') call relax(config, scene, variation, monitor, solver, &
       outcome)
+    if (outcome%status /= STATUS_OK) then
+      outcome%values(STEPS) = 0.0_wp
+      return
+    end if
     call start_clock(config, scene, solver, clock)
     if (observer%wants_ends) call show_state(solver, observer, clock)
     call watch(config, solver, observer, clock)
@@ -155,7 +159,7 @@ contains
     if (outcome%status /= STATUS_OK) then
       if (outcome%status /= STATUS_ABANDONED) outcome%reason = 'before time 0, in the '// &
         'relaxation: '//outcome%reason
-      outcome%values(FAILURE_STEP) = 0.0_wp
+      return
     end if
     call solver%grid%open_gate()
     solver%damping = config%loading%damping
@@ -382,7 +386,8 @@ contains
 
   !> Energy that appeared from nowhere since the start (negative: vanished): the change of kinetic and
   !> potential energy, and what stresses, damping and walls took, as a share of the largest of the
-  !> potential energy released, the peak of kinetic energy and the work of forces.
+  !> potential energy released, the peak of kinetic energy, the elastic energy at the start and the
+  !> work of forces.
   function energy_imbalance(config, solver, clock) result(share)
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
@@ -391,6 +396,7 @@ contains
 
     potential = potential_energy(solver%particles, config%loading%gravity)
     scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
+      clock%elastic_at_start, &
       abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
     share = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
       + solver%wall_work - solver%force_work - clock%energy_at_start)/scale
