@@ -16,9 +16,9 @@ Where the bounds come from:
                     since the edge of a disc of points is a staircase.
   energy            explicit steps do not conserve it. USL only loses it (Bardenhagen 2002); MUSL and USF make
                     a little in a collision of soft discs at 8 cells a diameter, most with hat functions, as
-                    their slopes jump between cells. ENERGY has twice what was measured when this was written, as a
-                    share of the peak of kinetic energy. What it is there to find is far larger:
-                    walls that held a rebounding block for its momentum but not for its strain made 0.8.
+                    their slopes jump between cells. ENERGY has twice what was measured when this was written,
+                    as a share of the peak of kinetic energy. What it is there to find is far larger: walls
+                    that held a rebounding block for its momentum but not for its strain made 0.8.
 """
 
 import itertools
