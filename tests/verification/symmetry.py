@@ -25,8 +25,10 @@ from runner import Result
 ELASTIC_BOUND = 1e-10
 SAND_BOUND = 1e-7
 SIDES = ("left", "right", "bottom", "top")
-# Beside the usual one, one with each other scheme and weighting function but for the hat functions.
-SOLVERS = (("musl", "gimp"), ("usf", "bspline"), ("usl", "cpgimp"))
+# Each scheme once, each smooth weighting function once. Not USL with domains (GIMP): a domain that reaches a
+# node by no matter how little, u, takes a finite strain from it at once (force over mass as 1/u, slope as u),
+# so that roundings decide; MUSL and USF take strains from velocities that know nothing of that force.
+SOLVERS = (("musl", "cpgimp"), ("usf", "gimp"), ("usl", "bspline"))
 # All four walls differ; the body touches none and is nowhere in the middle.
 BLOCK = {
     "low": [-1.0, -0.5],
@@ -209,8 +211,8 @@ def main():
                     bad = not worst <= allowed or steps != new_steps
                     missed += bad
                     print(
-                        f"{name}, {', '.join(solver)}, {change}: difference {worst:.1e}, allowed {allowed:.0e},"
-                        f" {new_steps} steps for {steps}{'  MISSED' if bad else ''}"
+                        f"{name}, {', '.join(solver)}, {change}: difference {worst:.1e},"
+                        f" allowed {allowed:.0e}, {new_steps} steps for {steps}{'  MISSED' if bad else ''}"
                     )
     return 1 if missed else 0
 
