@@ -127,6 +127,7 @@ def designed_case(index, u):
         gravity=loading["gravity"],
         boundary=has_boundary,
         field=has_field,
+        relaxed="relaxation" in loading,
     )
     return finish(
         f"d{index:05d}", text, facts, [model, f"{scheme} {weighting}", band(cfl)], files, expect, end_time
@@ -281,7 +282,7 @@ def points_file(x, y, width, height, spacing, seed):
     for j, i in itertools.product(range(rows), range(columns)):
         px = x + (i + 0.5) * dx + 0.5 * (dx - w) * random.uniform(-1, 1)
         py = y + (j + 0.5) * dy + 0.5 * (dy - h) * random.uniform(-1, 1)
-        lines.append(f"{px!r},{py!r},{w!r},{h!r}")
+        lines.append(",".join(repr(float(v)) for v in (px, py, w, h)))
     return "\n".join(lines) + "\n"
 
 

@@ -68,13 +68,8 @@ def judge(case, code, message, directory):
             return "failed", "; ".join(sorted({member["reason"] for member in failed.values()})), numbers
     except Broken as error:
         return "broken", str(error), numbers
-    gained = max(numbers["energy_error"], numbers["created"])
-    if gained > energy_bound(case["facts"]["cfl"]):
-        return (
-            "gained",
-            f"energy_error {numbers['energy_error']:+.3g}, created {numbers['created']:+.3g}",
-            numbers,
-        )
+    if numbers["created"] > energy_bound(case["facts"]["cfl"]):
+        return "gained", f"created {numbers['created']:+.3g}, ledger {numbers['ledger']:+.3g}", numbers
     return "ok", "", numbers
 
 
@@ -101,7 +96,9 @@ def check_failure(label, member, directory):
     """A failure has a reason, a step and a point, and the log tells it."""
     if not member["reason"].strip():
         raise Broken(f"{label}: failed with status {member['status']} without a reason")
-    if member["status"] not in (4, 6) and (member["failure_step"] < 1 or member["failure_point"] < 1):
+    in_stage = member["reason"].startswith("before time 0")
+    has_step = member["failure_step"] >= 1 or in_stage
+    if member["status"] not in (4, 6) and not (has_step and member["failure_point"] >= 1):
         raise Broken(f"{label}: failure without a step or a point: {member['reason']}")
     if member["reason"].split(":")[0] not in (directory / "run.log").read_text():
         raise Broken(f"{label}: the log does not tell the failure")
@@ -165,9 +162,9 @@ def check_state(label, facts, member, first, last):
     columns = (x >= x_min) & (x < x_max)
     start = first["volume"][columns].sum()
     found = member["profile"].sum(dtype=float) * facts["cell"]
-    if abs(found - start) > SINGLE * start + ROUNDING * facts["cell"] ** 2 and facts.get(
-        "one_material", True
-    ):
+    # Depths are at the initial density; the first state of a relaxed body is no longer at it.
+    allowed = 0.5 if facts.get("relaxed") else SINGLE
+    if abs(found - start) > allowed * start + ROUNDING * facts["cell"] ** 2:
         raise Broken(f"{label}: the profile holds {found:.9g} m2 of {start:.9g}")
     excess = yield_excess(facts, last)
     if excess > ROUNDING and facts.get("one_material", True):
@@ -196,10 +193,11 @@ def yield_excess(facts, state):
 
 
 def check_energy(label, facts, member, history, last, numbers):
-    """Notes the energy that came from nowhere: by the program's own account, and by ours.
+    """Notes the energy that came from nowhere, as a share of the energy that moved.
 
-    Ours is kinetic + elastic + potential energy, with what damping and walls took: plastic work can only lower it.
-    A speed beyond what the energy of the run allows shows up here too.
+    created   largest growth of kinetic + elastic + potential energy with what damping and walls took. Plastic work
+              can only lower it. A speed beyond what the energy of the run allows shows up here too.
+    ledger    the same with the work of the stresses at the end: how far the account of the program is from closed
     """
     kinetic, elastic, potential = (history[f"{k}_energy"] for k in ("kinetic", "elastic", "potential"))
     change = potential - potential[0]
@@ -215,8 +213,8 @@ def check_energy(label, facts, member, history, last, numbers):
     balance = without_plastic + history["plastic_work"]
     created = float((without_plastic - without_plastic[0]).max() / scale)
     error = float(balance[-1] - balance[0]) / scale
-    numbers["energy_error"] = max(numbers.get("energy_error", -math.inf), error)
-    numbers["energy_lost"] = min(numbers.get("energy_lost", math.inf), error)
+    numbers["ledger"] = max(numbers.get("ledger", -math.inf), error)
+    numbers["lost"] = min(numbers.get("lost", math.inf), error)
     numbers["reported"] = max(numbers.get("reported", -math.inf), member["energy_error"])
     numbers["created"] = max(numbers.get("created", -math.inf), created)
     numbers["steps"] = max(numbers.get("steps", 0), member["steps"])
