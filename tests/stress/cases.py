@@ -30,6 +30,9 @@ COORDINATES = (
     "fixed_step shuffle"
 ).split()
 
+# Keys of softening, in the order in which the judge takes them.
+RESIDUAL = ("residual_friction_angle", "residual_cohesion", "softening_start", "softening_end")
+
 MOST_POINTS = 400
 SPREAD = 1.0e-3
 
@@ -208,6 +211,7 @@ def draw_material(model, d):
             "softening_start": start,
             "softening_end": start + log_between(d["softening_end"], 1e-4, 1.0),
         }
+        facts["residual"] = [keys[k] for k in RESIDUAL]
     if model == "mohr_coulomb" and d["dilation_end"] > 0.7:
         keys["dilation_end"] = log_between((d["dilation_end"] - 0.7) / 0.3, 1e-4, 1.0)
     facts |= {"cohesion": cohesion, "tension": tension}

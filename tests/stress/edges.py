@@ -7,7 +7,7 @@ None is left out, a group with the value None too.
 import copy
 import itertools
 
-from cases import ACFS, METHODS, MODELS, SCHEMES, WEIGHTINGS, finish, group, wave_modulus
+from cases import ACFS, METHODS, MODELS, RESIDUAL, SCHEMES, WEIGHTINGS, finish, group, wave_modulus
 
 OK, NAMED, EITHER, REFUSED = (0,), (4,), (0, 4), (2,)
 
@@ -77,6 +77,8 @@ def variant(name, expect, files=None, extra="", **changes):
         "field": "random_field" in groups,
         "one_material": "&material" not in extra,
     }
+    if "softening" in material:
+        facts["residual"] = [material.get(key, 0.0) for key in RESIDUAL]
     return finish(name, text, facts, ["by hand"], files or {}, expect, groups["solver"]["end_time"])
 
 

@@ -13,10 +13,10 @@ import re
 import h5py
 import numpy as np
 
-# Created energy that a completed run may show, as a share of the energy that moved. The explicit step exchanges
-# kinetic and elastic energy with an error of (omega dt)^2/4 <= CFL^2 of what swings in the stiffest mode of the grid
-# (omega dt <= 2 CFL); nothing physical creates any.
-ENERGY_SLACK = 0.02
+# Created energy that a completed run may show, as a share of the energy that moved; nothing physical creates any.
+# Elastic verification cases ask for 1 % at their finer steps, and stable_cfl.py finds less than 3 % up to CFL 0.5;
+# an unstable run gains many times this.
+ENERGY_SLACK = 0.05
 # Rounding: results are sums of at most 400 terms in double precision, at coordinates of up to 1e4 cells.
 ROUNDING = 1e-9
 # Rounding of stresses, as a share of the modulus.
@@ -31,11 +31,6 @@ UNKNOWN_ALLOWED = {"settle_time", "failure_step", "failure_point", "failure_x", 
 
 class Broken(Exception):
     """What is wrong, in words."""
-
-
-def energy_bound(cfl):
-    """Largest share of created energy that is no fault."""
-    return max(ENERGY_SLACK, cfl**2)
 
 
 def judge(case, code, message, directory):
@@ -68,7 +63,7 @@ def judge(case, code, message, directory):
             return "failed", "; ".join(sorted({member["reason"] for member in failed.values()})), numbers
     except Broken as error:
         return "broken", str(error), numbers
-    if numbers["created"] > energy_bound(case["facts"]["cfl"]):
+    if numbers["created"] > ENERGY_SLACK:
         return "gained", f"created {numbers['created']:+.3g}, ledger {numbers['ledger']:+.3g}", numbers
     return "ok", "", numbers
 
@@ -185,8 +180,15 @@ def yield_excess(facts, state):
         return float(np.max((radius - facts["strength"]) / (size + facts["strength"])))
     if facts["model"] != "mohr_coulomb":
         return 0.0
-    angle = np.radians(state["friction_angle"])
-    cohesion = 2 * facts["cohesion"] * np.cos(angle)
+    angle, cohesion = state["friction_angle"], facts["cohesion"]
+    if "residual" in facts:
+        # Linear from softening_start to softening_end; points that start below the residual angle keep theirs.
+        residual_angle, residual_cohesion, start, end = facts["residual"]
+        share = np.clip((state["plastic_strain"] - start) / (end - start), 0.0, 1.0)
+        angle = angle + share * np.minimum(0.0, residual_angle - angle)
+        cohesion = cohesion + share * (residual_cohesion - cohesion)
+    angle = np.radians(angle)
+    cohesion = 2 * cohesion * np.cos(angle)
     cone = ((high - low) + (high + low) * np.sin(angle) - cohesion) / (2 * size + cohesion)
     cut_off = (high - facts["tension"]) / (size + facts["tension"])
     return float(max(np.max(cone), np.max(cut_off)))
