@@ -13,12 +13,14 @@ import re
 import h5py
 import numpy as np
 
-# Created energy that a completed run may show, as a share of the energy that moved. The explicit step exchanges
-# kinetic and elastic energy with an error of (omega dt)^2/4 <= CFL^2 of what swings in the stiffest mode of the grid
-# (omega dt <= 2 CFL); nothing physical creates any.
-ENERGY_SLACK = 0.02
+# Created energy that a completed run may show, as a share of the energy that moved; nothing physical creates any.
+# Elastic verification cases ask for 1 % at their finer steps, and stable_cfl.py finds less than 3 % up to CFL 0.5;
+# an unstable run gains many times this.
+ENERGY_SLACK = 0.05
 # Rounding: results are sums of at most 400 terms in double precision, at coordinates of up to 1e4 cells.
 ROUNDING = 1e-9
+# Rounding of stresses, as a share of the modulus.
+TRIAL_ROUNDING = 1e-13
 # Profiles are stored in single precision.
 SINGLE = 2e-6
 # A centre may come so far, in cells, behind a wall before the program calls its point lost.
@@ -29,11 +31,6 @@ UNKNOWN_ALLOWED = {"settle_time", "failure_step", "failure_point", "failure_x", 
 
 class Broken(Exception):
     """What is wrong, in words."""
-
-
-def energy_bound(cfl):
-    """Largest share of created energy that is no fault."""
-    return max(ENERGY_SLACK, cfl**2)
 
 
 def judge(case, code, message, directory):
@@ -66,13 +63,8 @@ def judge(case, code, message, directory):
             return "failed", "; ".join(sorted({member["reason"] for member in failed.values()})), numbers
     except Broken as error:
         return "broken", str(error), numbers
-    gained = max(numbers["energy_error"], numbers["created"])
-    if gained > energy_bound(case["facts"]["cfl"]):
-        return (
-            "gained",
-            f"energy_error {numbers['energy_error']:+.3g}, created {numbers['created']:+.3g}",
-            numbers,
-        )
+    if numbers["created"] > ENERGY_SLACK:
+        return "gained", f"created {numbers['created']:+.3g}, ledger {numbers['ledger']:+.3g}", numbers
     return "ok", "", numbers
 
 
@@ -99,7 +91,9 @@ def check_failure(label, member, directory):
     """A failure has a reason, a step and a point, and the log tells it."""
     if not member["reason"].strip():
         raise Broken(f"{label}: failed with status {member['status']} without a reason")
-    if member["status"] not in (4, 6) and (member["failure_step"] < 1 or member["failure_point"] < 1):
+    in_stage = member["reason"].startswith("before time 0")
+    has_step = member["failure_step"] >= 1 or in_stage
+    if member["status"] not in (4, 6) and not (has_step and member["failure_point"] >= 1):
         raise Broken(f"{label}: failure without a step or a point: {member['reason']}")
     if member["reason"].split(":")[0] not in (directory / "run.log").read_text():
         raise Broken(f"{label}: the log does not tell the failure")
@@ -108,7 +102,7 @@ def check_failure(label, member, directory):
 def check_member(case, label, member, directory, numbers):
     """Raises Broken unless the completed member is finite, bounded and consistent."""
     facts = case["facts"]
-    has_angle = facts["model"] == "mohr_coulomb"
+    has_angle = facts["model"] == "mohr_coulomb" and facts.get("one_material", True)
     for name, value in member.items():
         if name in UNKNOWN_ALLOWED or isinstance(value, str):
             continue
@@ -163,53 +157,68 @@ def check_state(label, facts, member, first, last):
     columns = (x >= x_min) & (x < x_max)
     start = first["volume"][columns].sum()
     found = member["profile"].sum(dtype=float) * facts["cell"]
-    if abs(found - start) > SINGLE * start + ROUNDING * facts["cell"] ** 2 and facts.get(
-        "one_material", True
-    ):
+    # Depths are at the initial density; the first state of a relaxed body is no longer at it.
+    allowed = 0.5 if facts.get("relaxed") else SINGLE
+    if abs(found - start) > allowed * start + ROUNDING * facts["cell"] ** 2:
         raise Broken(f"{label}: the profile holds {found:.9g} m2 of {start:.9g}")
     excess = yield_excess(facts, last)
-    if excess > ROUNDING:
+    if excess > ROUNDING and facts.get("one_material", True):
         raise Broken(f"{label}: stress beyond the yield surface by {excess:.3g} of itself")
 
 
 def yield_excess(facts, state):
-    """Largest relative violation of the yield criterion; stresses out of the plane are not stored."""
+    """Largest relative violation of the yield criterion; stresses out of the plane are not stored.
+
+    A returned stress is as exact as the trial stress it came from, 1e-13 of it in sg_mohr_coulomb; a trial stress
+    can be a fraction of the modulus.
+    """
     xx, yy, _, xy = state["stress"].T
     radius = np.hypot(0.5 * (xx - yy), xy)
     high, low = 0.5 * (xx + yy) + radius, 0.5 * (xx + yy) - radius
-    size = np.abs(state["stress"]).max(axis=1)
+    size = np.abs(state["stress"]).max(axis=1) + TRIAL_ROUNDING / ROUNDING * facts["modulus"]
     if facts["model"] in ("von_mises", "tresca"):
         return float(np.max((radius - facts["strength"]) / (size + facts["strength"])))
-    if facts["model"] != "mohr_coulomb" or "friction" in facts:
+    if facts["model"] != "mohr_coulomb":
         return 0.0
-    angle = np.radians(state["friction_angle"])
-    cohesion = 2 * facts["cohesion"] * np.cos(angle)
-    cone = ((high - low) + (high + low) * np.sin(angle) - cohesion) / (2 * size + cohesion + 1e-300)
-    cut_off = (high - facts["tension"]) / (size + facts["tension"] + 1e-300)
+    angle, cohesion = state["friction_angle"], facts["cohesion"]
+    if "residual" in facts:
+        # Linear from softening_start to softening_end; points that start below the residual angle keep theirs.
+        residual_angle, residual_cohesion, start, end = facts["residual"]
+        share = np.clip((state["plastic_strain"] - start) / (end - start), 0.0, 1.0)
+        angle = angle + share * np.minimum(0.0, residual_angle - angle)
+        cohesion = cohesion + share * (residual_cohesion - cohesion)
+    angle = np.radians(angle)
+    cohesion = 2 * cohesion * np.cos(angle)
+    cone = ((high - low) + (high + low) * np.sin(angle) - cohesion) / (2 * size + cohesion)
+    cut_off = (high - facts["tension"]) / (size + facts["tension"])
     return float(max(np.max(cone), np.max(cut_off)))
 
 
 def check_energy(label, facts, member, history, last, numbers):
-    """Notes the energy that came from nowhere: by the program's own account, and by ours.
+    """Notes the energy that came from nowhere, as a share of the energy that moved.
 
-    Ours is kinetic + elastic + potential energy, with what damping and walls took: plastic work can only lower it.
-    A speed beyond what the energy of the run allows shows up here too.
+    created   largest growth of kinetic + elastic + potential energy with what damping and walls took. Plastic work
+              can only lower it. A speed beyond what the energy of the run allows shows up here too.
+    ledger    the same with the work of the stresses at the end: how far the account of the program is from closed
     """
     kinetic, elastic, potential = (history[f"{k}_energy"] for k in ("kinetic", "elastic", "potential"))
     change = potential - potential[0]
-    floor = 1e-12 * (np.abs(potential).max() + kinetic.max() + elastic.max()) + 1e-300
-    scale = max(kinetic.max(), np.abs(change).max(), elastic.max()) + floor
-    total = kinetic + elastic + change
-    if "damping_work" in history:
-        total = total + history["damping_work"]
-    if "wall_work" in history:
-        total = total + history["wall_work"]
-    created = float((total - total[0]).max() / scale)
-    knows = not facts.get("boundary") or "wall_work" in history
-    error = member["energy_error"] if knows else 0.0
-    numbers["energy_error"] = max(numbers.get("energy_error", -math.inf), error)
-    numbers["energy_lost"] = min(numbers.get("energy_lost", math.inf), error)
-    numbers["created"] = max(numbers.get("created", -math.inf), created if knows else 0.0)
+    # Differences of energies are exact to a rounding of the largest of them, and of modulus times volume: a strain
+    # is known to 1e-16.
+    floor = 1e-12 * (np.abs(potential).max() + kinetic.max() + elastic.max())
+    floor += 1e-14 * facts["modulus"] * last["volume"].sum() + 1e-300
+    taken = history["damping_work"] + history["wall_work"]
+    scale = (
+        max(kinetic.max(), np.abs(change).max(), elastic.max(), np.abs(taken).max()) + floor / ENERGY_SLACK
+    )
+    without_plastic = kinetic + elastic + change + taken
+    balance = without_plastic + history["plastic_work"]
+    created = float((without_plastic - without_plastic[0]).max() / scale)
+    error = float(balance[-1] - balance[0]) / scale
+    numbers["ledger"] = max(numbers.get("ledger", -math.inf), error)
+    numbers["lost"] = min(numbers.get("lost", math.inf), error)
+    numbers["reported"] = max(numbers.get("reported", -math.inf), member["energy_error"])
+    numbers["created"] = max(numbers.get("created", -math.inf), created)
     numbers["steps"] = max(numbers.get("steps", 0), member["steps"])
     numbers["seconds"] = numbers.get("seconds", 0.0) + member["seconds"]
     numbers["swelling"] = float(last["volume"].max() / last["volume"].mean())
