@@ -79,7 +79,8 @@ contains
   end function create_prescribed
 
   !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
-  !> mass. `taken`: kinetic energy that the nodes lost to them in this step, J/m.
+  !> mass. `taken`: energy that the nodes lost to them in this step, J/m: force times the mean of the
+  !> velocities before and after the step (the wall pushes while the other forces do).
   pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
     type(condition_t), intent(inout) :: conditions(:)
     !> i_first, i_last, j_first, j_last.
@@ -89,7 +90,7 @@ contains
     real(wp), intent(in) :: total(8, 0:nx, 0:ny)
     real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
     real(wp), intent(out) :: taken
-    real(wp) :: before(2), after(2)
+    real(wp) :: old(2), before(2), after(2)
     integer :: c, i, j
 
     taken = 0.0_wp
@@ -100,11 +101,12 @@ contains
           do i = max(this%box(1), window(1)), min(this%box(2), window(2))
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
+            old = before - motion(1:2, i, j)
             call constrain(this, before, after)
             motion(3:4, i, j) = after
             motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
             this%impulse = this%impulse + total(1, i, j)*(after - before)
-            taken = taken + 0.5_wp*total(1, i, j)*(sum(before**2) - sum(after**2))
+            taken = taken - 0.5_wp*total(1, i, j)*dot_product(after - before, old + after)
           end do
         end do
       end associate

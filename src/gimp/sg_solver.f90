@@ -156,7 +156,8 @@ contains
     type(losses_t) :: losses
 
     call this%tally%reset()
-    if (this%scheme /= SCHEME_USF) this%time = this%time + time_step
+    ! Forces mapped in this step, of stresses too, are those of its end.
+    this%time = this%time + time_step
     select case (this%scheme)
     case (SCHEME_USL)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
@@ -182,7 +183,6 @@ contains
     this%damping_work = this%damping_work + losses%damping
     this%wall_work = this%wall_work + losses%walls
     this%internal_work = this%internal_work + this%tally%internal_work
-    if (this%scheme == SCHEME_USF) this%time = this%time + time_step
     call this%grid%set_window(this%tally)
   end subroutine advance
 

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import cases_beam
 import cases_column
+import cases_footing
+import cases_manufactured
 import cases_motion
 import cases_slope
 import cases_strength
@@ -26,6 +28,7 @@ CASES = {
     "free_fall": (4, cases_motion.free_fall),
     "affine": (6, cases_motion.affine),
     "spinning_disc": (6, cases_motion.spinning_disc),
+    "manufactured": (7, cases_manufactured.manufactured),
     "bar": (8, cases_column.bar),
     "flying_disc": (6, cases_motion.flying_disc),
     "self_weight_column": (9, cases_column.self_weight_column),
@@ -34,6 +37,7 @@ CASES = {
     "frictional_plane": (12, cases_slope.frictional_plane),
     "infinite_slope": (13, cases_slope.infinite_slope),
     "cantilever": (14, cases_beam.cantilever),
+    "footing": (15, cases_footing.footing),
 }
 
 COLUMNS = ("case", "quantity", "reference", "ours", "error", "allowed", "why", "command")

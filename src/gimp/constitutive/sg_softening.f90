@@ -1,7 +1,8 @@
 !> Mohr-Coulomb whose strength falls and whose dilation fades with the equivalent plastic strain kappa.
 !>
 !>   phi, c   linear from their first values at softening_start to the residual ones at softening_end
-!>   psi      linear from its first value at 0 to nothing at dilation_end
+!>   psi      linear from its first value at 0 to nothing at dilation_end; never above phi, where
+!>            plastic flow would give energy back
 !> The strength that returns a stress is that at the end of the step: kappa = kappa_n + dkappa(phi,
 !> c, psi), found by fixed-point iteration, which contracts by (softening modulus)/(2 G) a round.
 !> Where it does not (a drop of strength within a strain that is elastic), the strength at the start
@@ -69,6 +70,7 @@ contains
       sin_dilation = material%sin_dilation
       if (material%dilation_end > 0.0_wp) sin_dilation = sin(DEGREE*material%dilation_angle &
         *max(1.0_wp - strain/material%dilation_end, 0.0_wp))
+      sin_dilation = min(sin_dilation, sin_friction)
       sxx = trial(:, 1)
       syy = trial(:, 2)
       szz = trial(:, 3)
