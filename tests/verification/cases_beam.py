@@ -5,7 +5,7 @@ from judge import close, note
 
 
 def corner_drop(state):
-    """Vertical displacement of the lower corner of the free end, extrapolated from the four nearest points."""
+    """Vertical displacement of the lower corner of the free end, from the four nearest points."""
     start, drop = state.start.round(9), state.displacement[:, 1]
     columns, rows = np.unique(start[:, 0])[-2:][::-1], np.unique(start[:, 1])[:2]
     near = [[drop[(start[:, 0] == x) & (start[:, 1] == y)][0] for x in columns] for y in rows]

@@ -53,8 +53,8 @@ def flying_disc(bench):
 
 
 def affine(bench):
-    """Case 6, affine field: one step; points three cells and more from the edge of the block, whose nodes have
-    points all around with every weighting."""
+    """Case 6, affine field: one step; points three cells and more from the edge of the block: their nodes
+    have points all around, with every weighting."""
     step, lame, shear = 1e-3, 1e6 * 0.3 / (1.3 * 0.4), 1e6 / 2.6
     strain = np.array([0.3, 0.1, 0.0, 0.15]) * step
     exact = lame * (strain[0] + strain[1]) * np.array([1.0, 1.0, 1.0, 0.0]) + 2.0 * shear * strain
@@ -89,7 +89,7 @@ def spinning_disc(bench):
 
 def two_discs(bench):
     """Case 11, neo-Hookean: kinetic and elastic energy together are kept. Rate-form elasticity has no energy
-    function: with it the energy read off the stresses differs from the work done while the discs are squeezed."""
+    function: the energy read off its stresses differs from the work done while the discs are squeezed."""
     history = bench.run("two_discs").history
     kinetic, energy = history["kinetic_energy"], history["kinetic_energy"] + history["elastic_energy"]
     momentum = 1000.0 * 0.04 * np.pi * np.hypot(0.1, 0.1)

@@ -18,8 +18,8 @@ def path(history):
 
 
 def frictional_plane(bench):
-    """Case 12. Under much friction the elastic block hops, and on average less friction acts than mu N: the law
-    itself shows with damping of 20/s and a PIC share of a half, which leave no hopping."""
+    """Case 12. Under much friction the elastic block hops, and on average less friction acts than mu N. The
+    law itself shows with damping of 20/s and a PIC share of a half, which leave no hopping."""
     moved = path(bench.run("frictional_plane").history)[-1]
     yield close("way in 0.99 s, mu = 0.1, m", 1.987363, moved, 0.01, "demand 1 %")
     angle, damping = np.radians(30.0), 20.0
@@ -51,7 +51,7 @@ def frictional_plane(bench):
 
 
 def slope_acceleration(bench, degrees, friction_angle, dilation_angle):
-    """Acceleration and last speed of the middle above the lowest cell, in which all shear of the base lies."""
+    """Acceleration and last speed of the middle, above the lowest cell, which holds the shear of the base."""
     changes = {"material.friction_angle": friction_angle, "material.dilation_angle": dilation_angle}
     result = bench.run("infinite_slope", tilted(degrees) | changes)
     start = result.first.start

@@ -55,7 +55,7 @@ def element_compression(bench):
 def element_extension(bench):
     """Case 2, extension: the lower points, at the time when they have yielded and still carry stress."""
     states = bench.run("element_extension").states
-    # The lower points yield from 2.75 s on and carry nothing from 3.6 s on; the upper ones are through by 1.1 s.
+    # The lower points yield at 2.75 s and carry nothing from 3.6 s on; the upper ones are through by 1.1 s.
     stress = np.concatenate([s.stress[s.stress[:, 1] < -1.0] for s in states if 2.8 < s.time < 3.5])
     major, minor = principal(stress)
     first, root = invariants(stress)
@@ -67,7 +67,7 @@ def element_extension(bench):
 
 
 def element_unconfined(bench):
-    """Case 2, unconfined: slope between two states before yield, so that the constant force of the damping drops out."""
+    """Case 2, unconfined: slope between two states before yield: the constant force of damping drops out."""
     young, poisson, cohesion, rate = 1e7, 0.3, 1e-3, 1e-9
     states = bench.run("element_unconfined").states
     strength = 2.0 * cohesion * np.sqrt(PASSIVE)
