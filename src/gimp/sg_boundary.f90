@@ -103,6 +103,7 @@ contains
         this%impulse = 0.0_wp
         do j = max(this%box(3), window(3)), min(this%box(4), window(4))
           do i = max(this%box(1), window(1)), min(this%box(2), window(2))
+            if (this%kind == KIND_CONTACT) this%pressed(i, j) = .false.
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
             old = before - motion(1:2, i, j)

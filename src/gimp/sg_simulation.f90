@@ -134,7 +134,7 @@ contains
 
   !> The quasi-static stage before time 0: gravity acts on the body under the damping that is critical
   !> for its slowest wave, 2 omega = pi c/H, held at its toe if it is gated. Ends at rest or after
-  !> relaxation_time; then the points stand still and the gate is gone.
+  !> relaxation_time; then the gate is gone and the points have their first velocities.
   subroutine relax(config, scene, variation, monitor, solver, outcome)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
@@ -146,12 +146,19 @@ contains
     type(variation_t) :: whole
     type(clock_t) :: clock
     type(blind_observer_t) :: nobody
+    real(wp) :: vx(solver%particles%count), vy(solver%particles%count)
 
     stage = config
     stage%solver%end_time = config%loading%relaxation_time
     stage%solver%settle = max(config%solver%settle, RELAXED)
     whole = variation
     whole%last_step = huge(1)
+    vx = solver%particles%vx
+    vy = solver%particles%vy
+    solver%particles%vx = 0.0_wp
+    solver%particles%vy = 0.0_wp
+    call solver%grid%clear()
+    call solver%start()
     solver%damping = acos(-1.0_wp)*scene%wave_speed/(scene%extent(4) - scene%extent(3))
     if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe)
     call start_clock(stage, scene, solver, clock)
@@ -163,8 +170,8 @@ contains
     end if
     call solver%grid%open_gate()
     solver%damping = config%loading%damping
-    solver%particles%vx = 0.0_wp
-    solver%particles%vy = 0.0_wp
+    solver%particles%vx = vx
+    solver%particles%vy = vy
     solver%particles%plastic_strain = 0.0_wp
     call solver%grid%clear()
     call solver%start()

@@ -274,13 +274,14 @@ contains
         end if
         call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
           this%tally%internal_work, this%tally%wave_squared)
-        if (this%stretches_domains) call this%stretch_domains(body, first, last)
       end if
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
           p%x(first:last), &
                          p%y(first:last), this%tally%motion_energy)
         call this%note_block(first, last)
+        ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
+        if (this%stretches_domains) call this%stretch_domains(body, first, last)
         call this%find_weights(first, last, w)
       end if
       if (this%averages_cells .and. sweep%map_force) then

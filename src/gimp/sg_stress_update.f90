@@ -44,8 +44,8 @@ contains
         call hyperelastic_block(p, material, first, last)
       else
         call update_volume(n, strain, p%volume(first:last))
-        if (material%is_brittle) call release_open(n, p%gap(first:last), p%sxx(first:last), &
-          p%syy(first:last), p%szz(first:last), p%sxy(first:last))
+        if (material%is_brittle) call release_open(n, material%bulk, p%gap(first:last), &
+          p%sxx(first:last), p%syy(first:last), p%szz(first:last), p%sxy(first:last))
         if (material%model /= MODEL_LINEAR_ELASTIC) call close_gap(n, strain, p%gap(first:last))
         call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), &
           p%syy(first:last), p%szz(first:last), p%sxy(first:last))

@@ -81,17 +81,19 @@ contains
     end do
   end subroutine close_gap
 
-  !> Points that opened in the step before let go of the tension that held them at the apex.
-  pure subroutine release_open(n, gap, sxx, syy, szz, sxy)
+  !> Points that opened in the step before let go of the tension that held them at the apex; the
+  !> elastic strain that it took, mean stress over `bulk` (Pa), goes into the gap.
+  pure subroutine release_open(n, bulk, gap, sxx, syy, szz, sxy)
     integer, intent(in) :: n
-    real(wp), intent(in) :: gap(n)
-    real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n)
+    real(wp), intent(in) :: bulk
+    real(wp), intent(inout) :: gap(n), sxx(n), syy(n), szz(n), sxy(n)
     real(wp) :: kept
     integer :: p
 
     !$omp simd private(kept)
     do p = 1, n
       kept = merge(0.0_wp, 1.0_wp, gap(p) > 0.0_wp)
+      gap(p) = gap(p) + (1.0_wp - kept)*max(sxx(p) + syy(p) + szz(p), 0.0_wp)/(3.0_wp*bulk)
       sxx(p) = kept*sxx(p)
       syy(p) = kept*syy(p)
       szz(p) = kept*szz(p)
