@@ -29,6 +29,7 @@ STATUS_TEXTS = {
     4: "time limit",
     5: "runaway speed",
     6: "field failed",
+    7: "energy created",
 }
 
 INTEGER_COLUMNS = ("settled", "wall_touched", "steps", "failure_step", "failure_point")

@@ -323,7 +323,8 @@ module sg_schema
     identity=.false., meaning='Wall clock time between two progress lines')]
 
   type(key_t), parameter :: KEYS(*) = [CASE_KEYS, GRID_KEYS, MATERIAL_KEYS, BODY_KEYS, &
-    BOUNDARY_KEYS, LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, MONTE_CARLO_KEYS, STUDY_KEYS, OUTPUT_KEYS]
+    BOUNDARY_KEYS, LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, MONTE_CARLO_KEYS, STUDY_KEYS, &
+    OUTPUT_KEYS]
 
 contains
 

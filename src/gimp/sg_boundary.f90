@@ -18,6 +18,10 @@ module sg_boundary
   integer, parameter :: KIND_HELD = 1
   integer, parameter :: KIND_CONTACT = 2
 
+  integer, parameter :: TOUCH_NONE = 0
+  integer, parameter :: TOUCH_SLIPS = 1
+  integer, parameter :: TOUCH_STICKS = 2
+
   type :: condition_t
     integer :: kind = KIND_HELD
     !> Nodes i_first, i_last, j_first, j_last; none at first.
@@ -31,10 +35,12 @@ module sg_boundary
     real(wp) :: friction = 0.0_wp
     !> Not one of the four walls: what it pushes with is reported as reaction.
     logical :: is_prescribed = .false.
-    !> Contact: which nodes of the box the material pressed on in the last step.
-    logical, allocatable :: pressed(:, :)
+    !> Contact: what became of the nodes of the box in the last step, one of the TOUCH_ constants.
+    integer, allocatable :: touch(:, :)
     !> Momentum given to the nodes in the last step, kg/s.
     real(wp) :: impulse(2) = 0.0_wp
+  contains
+    procedure :: is_contact
   end type condition_t
 
 contains
@@ -59,12 +65,19 @@ contains
     case ('frictional')
       wall%kind = KIND_CONTACT
       wall%friction = friction
-      allocate (wall%pressed(box(1):box(2), box(3):box(4)))
-      wall%pressed = .false.
+      allocate (wall%touch(box(1):box(2), box(3):box(4)))
+      wall%touch = TOUCH_NONE
     case default ! free: no node
       wall%box = [0, -1, 0, -1]
     end select
   end function create_wall
+
+  !> Does it act only where the material presses on it?
+  elemental function is_contact(this)
+    class(condition_t), intent(in) :: this
+    logical :: is_contact
+    is_contact = this%kind == KIND_CONTACT
+  end function is_contact
 
   !> Prescribed velocity of the nodes in a box of the case file; `origin` is the place of node (0,
   !> 0) in m. A node that is outside by less than 1e-6 of a cell counts as inside.
@@ -104,13 +117,12 @@ contains
         this%impulse = 0.0_wp
         do j = max(this%box(3), window(3)), min(this%box(4), window(4))
           do i = max(this%box(1), window(1)), min(this%box(2), window(2))
-            if (this%kind == KIND_CONTACT) this%pressed(i, j) = .false.
+            if (this%kind == KIND_CONTACT) this%touch(i, j) = TOUCH_NONE
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
             old = before - motion(1:2, i, j)
             call constrain(this, before, after)
-            if (this%kind == KIND_CONTACT) this%pressed(i, j) = &
-              this%sign*before(this%normal) < 0.0_wp
+            if (this%kind == KIND_CONTACT) this%touch(i, j) = touch_of(this, before, after)
             motion(3:4, i, j) = after
             motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
             this%impulse = this%impulse + total(1, i, j)*(after - before)
@@ -120,6 +132,18 @@ contains
       end associate
     end do
   end subroutine apply_conditions
+
+  !> What a wall with contact did to a node; one of the TOUCH_ constants.
+  pure function touch_of(this, before, after) result(touch)
+    type(condition_t), intent(in) :: this
+    real(wp), intent(in) :: before(2), after(2)
+    integer :: touch
+
+    touch = TOUCH_NONE
+    if (.not. this%sign*before(this%normal) < 0.0_wp) return
+    touch = TOUCH_SLIPS
+    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) touch = TOUCH_STICKS
+  end function touch_of
 
   !> Velocity of one node after condition `this`.
   pure subroutine constrain(this, before, after)
@@ -142,8 +166,8 @@ contains
     end if
   end subroutine constrain
 
-  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and the
-  !> normal ones of nodes that a wall with contact pressed on in the last momentum balance. (To cut
+  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and those
+  !> that a wall with contact held in the last momentum balance. (To cut
   !> off the motion into the wall alone would make a mean motion out of it out of any noise.)
   pure subroutine hold_conditions(conditions, window, nx, ny, motion)
     type(condition_t), intent(in) :: conditions(:)
@@ -156,7 +180,8 @@ contains
         do j = max(this%box(3), window(3)), min(this%box(4), window(4))
           do i = max(this%box(1), window(1)), min(this%box(2), window(2))
             if (this%kind == KIND_CONTACT) then
-              if (this%pressed(i, j)) motion(2 + this%normal, i, j) = 0.0_wp
+              if (this%touch(i, j) /= TOUCH_NONE) motion(2 + this%normal, i, j) = 0.0_wp
+              if (this%touch(i, j) == TOUCH_STICKS) motion(5 - this%normal, i, j) = 0.0_wp
             else
               where (this%held) motion(3:4, i, j) = this%velocity
             end if

@@ -47,7 +47,8 @@ module sg_grid
   type :: grid_t
     real(wp) :: cell_size
     type(axis_t) :: x, y
-    !> The four walls, then the prescribed velocities, applied in this order.
+    !> Walls that hold, walls with contact (at a corner friction must not slip where the other wall
+    !> holds), then the prescribed velocities, applied in this order.
     type(condition_t), allocatable :: conditions(:)
     !> The last condition is a gate.
     logical :: has_gate = .false.
@@ -96,6 +97,7 @@ contains
     type(grid_config_t), intent(in) :: config
     type(boundary_config_t), intent(in) :: boundaries(:)
     real(wp), intent(in) :: stretch, least_point_mass
+    type(condition_t) :: walls(4)
     integer :: nodes, k
 
     this%cell_size = config%cell_size*(1.0_wp + stretch)
@@ -104,18 +106,15 @@ contains
     this%y = create_axis(config%y_min, config%y_max, config%cell_size, this%cell_size, &
       config%bottom, config%top)
     associate (nx => this%x%last, ny => this%y%last)
-      allocate (this%conditions(4 + size(boundaries)))
-      this%conditions(1) = create_wall(config%left, config%left_friction, [0, GHOST, 0, ny], 1, &
-        1.0_wp)
-      this%conditions(2) = create_wall(config%right, config%right_friction, &
-        [nx - GHOST, nx, 0, ny], 1, -1.0_wp)
-      this%conditions(3) = create_wall(config%bottom, config%bottom_friction, [0, nx, 0, GHOST], &
-        2, 1.0_wp)
-      this%conditions(4) = create_wall(config%top, config%top_friction, [0, nx, ny - GHOST, ny], &
-        2, -1.0_wp)
+      walls(1) = create_wall(config%left, config%left_friction, [0, GHOST, 0, ny], 1, 1.0_wp)
+      walls(2) = create_wall(config%right, config%right_friction, [nx - GHOST, nx, 0, ny], 1, &
+        -1.0_wp)
+      walls(3) = create_wall(config%bottom, config%bottom_friction, [0, nx, 0, GHOST], 2, 1.0_wp)
+      walls(4) = create_wall(config%top, config%top_friction, [0, nx, ny - GHOST, ny], 2, -1.0_wp)
+      this%conditions = [pack(walls, .not. walls%is_contact()), pack(walls, walls%is_contact())]
       do k = 1, size(boundaries)
-        this%conditions(4 + k) = create_prescribed(boundaries(k), [this%x%origin, &
-          this%y%origin], this%cell_size)
+        this%conditions = [this%conditions, create_prescribed(boundaries(k), [this%x%origin, &
+          this%y%origin], this%cell_size)]
       end do
       this%window = [0, nx, 0, ny]
       nodes = (nx + 1)*(ny + 1)

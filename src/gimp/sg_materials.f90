@@ -97,7 +97,9 @@ contains
     material%softens = config%softening == 'linear' .or. config%dilation_end > 0.0_wp
     material%residual_friction_angle = config%friction_angle
     material%residual_cohesion = config%cohesion
-    material%softening_end = 1.0_wp
+    ! Strength never begins to fall.
+    material%softening_start = 0.5_wp*huge(1.0_wp)
+    material%softening_end = huge(1.0_wp)
     if (config%softening /= 'linear') return
     material%residual_friction_angle = config%residual_friction_angle
     material%residual_cohesion = config%residual_cohesion

@@ -10,8 +10,8 @@ module sg_simulation
   use sg_outcome, only: ENERGY_ERROR, FAILURE_POINT, FAILURE_STEP, FAILURE_X, FAILURE_Y, &
     FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
-    RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_NOT_FINITE, STATUS_OK, &
-    STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
+    RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_ENERGY_CREATED, &
+    STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle
@@ -51,6 +51,10 @@ module sg_simulation
   !> A speed this many times above all that the scene can explain (wave speed, fall through the
   !> domain, initial speed) counts as runaway.
   real(wp), parameter :: RUNAWAY_FACTOR = 10.0_wp
+  !> Steps between two looks at the ledger of energy, and the share of created energy at which a run
+  !> has failed. What is stable creates 1 to 2 % at the most (tests/verification/conservation.py).
+  integer, parameter :: STEPS_PER_LEDGER = 64
+  real(wp), parameter :: MOST_CREATED = 0.1_wp
   !> "Stays below": for one fundamental period of the body, 4 H/c, so that the turning points of an
   !> elastic oscillation do not pass for rest.
   real(wp), parameter :: SETTLE_PERIODS = 1.0_wp
@@ -249,7 +253,7 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: margin, x_first, x_last, y_first, y_last
+    real(wp) :: margin, x_first, x_last, y_first, y_last, created
     integer :: p
 
     margin = OUTSIDE_MARGIN*solver%grid%cell_size
@@ -282,6 +286,14 @@ contains
         .and. clock%time < config%solver%end_time) then
         p = maxloc(s%volume/s%mass, dim=1)
         call fail(STATUS_STEP_COLLAPSE, p, 'time step fell to '//to_text(clock%time_step, 4)//' s')
+      else if (mod(clock%step, STEPS_PER_LEDGER) == 0) then
+        created = energy_created(config, solver, clock)
+        if (created > MOST_CREATED) then
+          p = maxloc(s%vx**2 + s%vy**2, dim=1)
+          call fail(STATUS_ENERGY_CREATED, p, 'the scheme made energy from nothing, '// &
+            to_text(created, 3)//' of what was there: lower the cfl number, or use scheme = '// &
+            '''musl'' and weighting = ''gimp''; the point is the fastest one')
+        end if
       end if
     end associate
 
@@ -399,15 +411,41 @@ contains
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
-    real(wp) :: share, potential, scale
+    real(wp) :: share, potential
 
     potential = potential_energy(solver%particles, config%loading%gravity)
-    scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
-      clock%elastic_at_start, &
-      abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
     share = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
-      + solver%wall_work - solver%force_work - clock%energy_at_start)/scale
+      + solver%wall_work - solver%force_work - clock%energy_at_start) &
+      /energy_scale(config, solver, clock)
   end function energy_imbalance
+
+  !> What errors of energy are measured by, J/m.
+  function energy_scale(config, solver, clock) result(scale)
+    type(config_t), intent(in) :: config
+    type(solver_t), intent(in) :: solver
+    type(clock_t), intent(in) :: clock
+    real(wp) :: scale
+
+    scale = max(abs(clock%potential_at_start - potential_energy(solver%particles, &
+      config%loading%gravity)), clock%peak_energy, clock%elastic_at_start, &
+      abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
+  end function energy_scale
+
+  !> Rise of the mechanical energy (kinetic, potential, elastic) above its first value and what
+  !> prescribed velocities and body forces put in, as a share of the same scale: nothing passive can
+  !> do that, whatever it loses on the way.
+  function energy_created(config, solver, clock) result(share)
+    type(config_t), intent(in) :: config
+    type(solver_t), intent(in) :: solver
+    type(clock_t), intent(in) :: clock
+    real(wp) :: share, rise
+
+    rise = solver%tally%kinetic_energy + potential_energy(solver%particles, &
+      config%loading%gravity) - clock%energy_at_start + elastic_energy(solver%particles, &
+      solver%materials) - clock%elastic_at_start
+    share = (rise - max(-solver%wall_work, 0.0_wp) - max(solver%force_work, 0.0_wp)) &
+      /energy_scale(config, solver, clock)
+  end function energy_created
 
   !> The columns of a member that ended well.
   subroutine measure(config, scene, variation, solver, clock, outcome)
