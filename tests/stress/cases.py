@@ -142,7 +142,10 @@ def finish(name, text, facts, groups, files, expect, end_time, history=20):
     head = group("case", name=name)
     if "&output" not in text:
         text += group(
-            "output", history_interval=end_time / history, snapshot_members=1 if facts.get("field") else None
+            "output",
+            history_interval=end_time / history,
+            snapshot_interval=end_time / 4,
+            snapshot_members=1 if facts.get("field") else None,
         )
     if "&monte_carlo" not in text:
         realizations = 1 if facts.get("field") else None
