@@ -386,6 +386,12 @@ contains
           'not gravity = '//to_text(loading%gravity(1))//', '//to_text(loading%gravity(2))// &
           ' (allowed: gravity = 0, negative; or ''none'')')
       end if
+      if (loading%initial_stress == 'geostatic' .and. any(desk%config%materials%model == &
+        'neo_hookean')) then
+        call desk%fault('loading', 1, 'initial_stress', '''geostatic'' cannot be given to a '// &
+          'neo_hookean material, whose stress follows from its deformation (allowed: ''none''; '// &
+          'relaxation = ''open'' or ''gated'' brings it to rest)')
+      end if
     end associate
   end subroutine check_loading
 

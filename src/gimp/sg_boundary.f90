@@ -30,6 +30,8 @@ module sg_boundary
     real(wp) :: friction = 0.0_wp
     !> Not one of the four walls: what it pushes with is reported as reaction.
     logical :: is_prescribed = .false.
+    !> Contact: which nodes of the box the material pressed on in the last step.
+    logical, allocatable :: pressed(:, :)
     !> Momentum given to the nodes in the last step, kg/s.
     real(wp) :: impulse(2) = 0.0_wp
   end type condition_t
@@ -56,6 +58,8 @@ contains
     case ('frictional')
       wall%kind = KIND_CONTACT
       wall%friction = friction
+      allocate (wall%pressed(box(1):box(2), box(3):box(4)))
+      wall%pressed = .false.
     case default ! free: no node
       wall%box = [0, -1, 0, -1]
     end select
@@ -99,10 +103,13 @@ contains
         this%impulse = 0.0_wp
         do j = max(this%box(3), window(3)), min(this%box(4), window(4))
           do i = max(this%box(1), window(1)), min(this%box(2), window(2))
+            if (this%kind == KIND_CONTACT) this%pressed(i, j) = .false.
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
             old = before - motion(1:2, i, j)
             call constrain(this, before, after)
+            if (this%kind == KIND_CONTACT) this%pressed(i, j) = &
+              this%sign*before(this%normal) < 0.0_wp
             motion(3:4, i, j) = after
             motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
             this%impulse = this%impulse + total(1, i, j)*(after - before)
@@ -134,21 +141,21 @@ contains
     end if
   end subroutine constrain
 
-  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and no
-  !> motion into a wall with contact. Friction has had its part.
+  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and the
+  !> normal ones of nodes that a wall with contact pressed on in the last momentum balance. (To cut
+  !> off the motion into the wall alone would make a mean motion out of it out of any noise.)
   pure subroutine hold_conditions(conditions, window, nx, ny, motion)
     type(condition_t), intent(in) :: conditions(:)
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
-    integer :: c, i, j, k
+    integer :: c, i, j
 
     do c = 1, size(conditions)
       associate (this => conditions(c))
         do j = max(this%box(3), window(3)), min(this%box(4), window(4))
           do i = max(this%box(1), window(1)), min(this%box(2), window(2))
             if (this%kind == KIND_CONTACT) then
-              k = 2 + this%normal
-              motion(k, i, j) = this%sign*max(this%sign*motion(k, i, j), 0.0_wp)
+              if (this%pressed(i, j)) motion(2 + this%normal, i, j) = 0.0_wp
             else
               where (this%held) motion(3:4, i, j) = this%velocity
             end if

@@ -38,6 +38,8 @@ module sg_materials
     logical :: softens = .false.
     real(wp) :: residual_friction_angle = 0.0_wp, residual_cohesion = 0.0_wp
     real(wp) :: softening_start = 0.0_wp, softening_end = 0.0_wp, dilation_end = 0.0_wp
+    !> A point at the apex carries tension, which it loses once it is open.
+    logical :: is_brittle = .false.
     !> Drucker-Prager: f = sqrt(J2) + alpha I1 - k, flow with alpha_flow, mean stress at most
     !> mean_limit; k and mean_limit in Pa.
     real(wp) :: alpha = 0.0_wp, alpha_flow = 0.0_wp, k = 0.0_wp, mean_limit = 0.0_wp
@@ -84,6 +86,7 @@ contains
     case default
       material%model = MODEL_LINEAR_ELASTIC
     end select
+    material%is_brittle = material%tension_strength > 0.0_wp .or. material%mean_limit > 0.0_wp
   end function create_material
 
   pure subroutine set_softening(config, material)

@@ -39,6 +39,9 @@ module sg_scene
     procedure :: points_of
   end type scene_t
 
+  !> Share of a cell by which a length may exceed it: rounding of a decimal number.
+  real(wp), parameter :: EDGE_TOLERANCE = 1.0e-6_wp
+
 contains
 
   !> Number of points of a material.
@@ -125,6 +128,11 @@ contains
         if (number > 0) then
           call raise(error, EXIT_BAD_INPUT, to_text(number)//' points of body '// &
             trim(config%bodies(b)%name)//' lie outside the grid', 'build_scene')
+          return
+        end if
+        if (max(l%width, l%height) > g%cell_size*(1.0_wp + EDGE_TOLERANCE)) then
+          call raise(error, EXIT_BAD_INPUT, 'points of body '//trim(config%bodies(b)%name)// &
+            ' are wider or higher than a cell', 'build_scene')
           return
         end if
         do a = 1, size(lattices)

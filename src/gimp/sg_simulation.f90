@@ -90,6 +90,10 @@ contains
     call prepare(config, scene, variation, observer, solver)
     if (config%loading%relaxation /= 'none') call relax(config, scene, variation, monitor, solver, &
       outcome)
+    if (outcome%status /= STATUS_OK) then
+      outcome%values(STEPS) = 0.0_wp
+      return
+    end if
     call start_clock(config, scene, solver, clock)
     if (observer%wants_ends) call show_state(solver, observer, clock)
     call watch(config, solver, observer, clock)
@@ -130,7 +134,7 @@ contains
 
   !> The quasi-static stage before time 0: gravity acts on the body under the damping that is critical
   !> for its slowest wave, 2 omega = pi c/H, held at its toe if it is gated. Ends at rest or after
-  !> relaxation_time; then the points stand still and the gate is gone.
+  !> relaxation_time; then the gate is gone and the points have their first velocities.
   subroutine relax(config, scene, variation, monitor, solver, outcome)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
@@ -142,12 +146,19 @@ contains
     type(variation_t) :: whole
     type(clock_t) :: clock
     type(blind_observer_t) :: nobody
+    real(wp) :: vx(solver%particles%count), vy(solver%particles%count)
 
     stage = config
     stage%solver%end_time = config%loading%relaxation_time
     stage%solver%settle = max(config%solver%settle, RELAXED)
     whole = variation
     whole%last_step = huge(1)
+    vx = solver%particles%vx
+    vy = solver%particles%vy
+    solver%particles%vx = 0.0_wp
+    solver%particles%vy = 0.0_wp
+    call solver%grid%clear()
+    call solver%start()
     solver%damping = acos(-1.0_wp)*scene%wave_speed/(scene%extent(4) - scene%extent(3))
     if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe)
     call start_clock(stage, scene, solver, clock)
@@ -155,12 +166,12 @@ contains
     if (outcome%status /= STATUS_OK) then
       if (outcome%status /= STATUS_ABANDONED) outcome%reason = 'before time 0, in the '// &
         'relaxation: '//outcome%reason
-      outcome%values(FAILURE_STEP) = 0.0_wp
+      return
     end if
     call solver%grid%open_gate()
     solver%damping = config%loading%damping
-    solver%particles%vx = 0.0_wp
-    solver%particles%vy = 0.0_wp
+    solver%particles%vx = vx
+    solver%particles%vy = vy
     solver%particles%plastic_strain = 0.0_wp
     call solver%grid%clear()
     call solver%start()
@@ -382,7 +393,8 @@ contains
 
   !> Energy that appeared from nowhere since the start (negative: vanished): the change of kinetic and
   !> potential energy, and what stresses, damping and walls took, as a share of the largest of the
-  !> potential energy released, the peak of kinetic energy and the work of forces.
+  !> potential energy released, the peak of kinetic energy, the elastic energy at the start and the
+  !> work of forces.
   function energy_imbalance(config, solver, clock) result(share)
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
@@ -391,6 +403,7 @@ contains
 
     potential = potential_energy(solver%particles, config%loading%gravity)
     scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
+      clock%elastic_at_start, &
       abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
     share = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
       + solver%wall_work - solver%force_work - clock%energy_at_start)/scale

@@ -42,8 +42,8 @@ module sg_solver
     integer :: move_with = 0
     logical :: map_momentum = .false.
     logical :: map_force = .false.
-    !> Only adds up the volumetric strain rate in the cells (anti-locking).
-    logical :: average_divergence = .false.
+    !> Only adds up the volumetric strain rate, or the pressure, in the cells (anti-locking).
+    logical :: average_divergence = .false., average_pressure = .false.
   end type sweep_t
 
   type :: solver_t
@@ -54,7 +54,7 @@ module sg_solver
     !> The domains of the points follow their stretch (cpGIMP).
     logical :: stretches_domains = .false.
     type(material_t), allocatable :: materials(:)
-    !> Volumetric strain rates are those of the cells (sg_cell_average).
+    !> Volumetric strain rates and pressures are those of the cells (sg_cell_average).
     logical :: averages_cells = .false.
     type(cell_average_t) :: cells
     !> Amplitude of the manufactured solution in m, 0: none; time in s.
@@ -75,7 +75,9 @@ module sg_solver
     procedure, private :: sweep_block
     procedure, private :: find_weights
     procedure, private :: stretch_domains
-    procedure, private :: average_cells
+    procedure, private :: sweep_stress
+    procedure, private :: average_pressure
+    procedure, private :: average_block
     procedure, private :: push_points
     procedure, private :: note_block
   end type solver_t
@@ -127,6 +129,7 @@ contains
     this%force_work = 0.0_wp
     this%damping_work = 0.0_wp
     this%wall_work = 0.0_wp
+    call this%average_pressure()
     call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
       0.0_wp)
     call note_all(this)
@@ -161,21 +164,18 @@ contains
     select case (this%scheme)
     case (SCHEME_USL)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
-      call this%average_cells()
-      call this%sweep_points(sweep_t(update_velocity=.true., update_stress=.true., move_with=3, &
+      call this%sweep_stress(sweep_t(update_velocity=.true., update_stress=.true., move_with=3, &
                                      map_momentum=.true., map_force=.true.), time_step)
     case (SCHEME_MUSL)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., map_momentum=.true.), time_step)
       call this%grid%remap_velocity()
-      call this%average_cells()
-      call this%sweep_points(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
+      call this%sweep_stress(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
         map_force=.true.), &
                              time_step)
     case default ! SCHEME_USF
       call this%grid%find_velocity()
-      call this%average_cells()
-      call this%sweep_points(sweep_t(update_stress=.true., map_force=.true.), time_step)
+      call this%sweep_stress(sweep_t(update_stress=.true., map_force=.true.), time_step)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., move_with=3, map_momentum=.true.), &
         time_step)
@@ -186,14 +186,36 @@ contains
     call this%grid%set_window(this%tally)
   end subroutine advance
 
-  !> The first of two passes over the points where volumetric strain is that of the cells.
-  subroutine average_cells(this)
+  !> A sweep that updates stress. Where cells are averaged, in four passes: rates in the cells,
+  !> stress, pressure in the cells, forces.
+  subroutine sweep_stress(this, sweep, time_step)
+    class(solver_t), intent(inout) :: this
+    type(sweep_t), intent(in) :: sweep
+    real(wp), intent(in) :: time_step
+    type(sweep_t) :: part
+
+    if (.not. this%averages_cells) then
+      call this%sweep_points(sweep, time_step)
+      return
+    end if
+    call this%cells%clear(this%grid%x, this%grid%y)
+    call this%sweep_points(sweep_t(average_divergence=.true.), 0.0_wp)
+    part = sweep
+    part%map_momentum = .false.
+    part%map_force = .false.
+    call this%sweep_points(part, time_step)
+    call this%average_pressure()
+    call this%sweep_points(sweep_t(map_momentum=sweep%map_momentum, map_force=sweep%map_force), &
+      time_step)
+  end subroutine sweep_stress
+
+  subroutine average_pressure(this)
     class(solver_t), intent(inout) :: this
 
     if (.not. this%averages_cells) return
     call this%cells%clear(this%grid%x, this%grid%y)
-    call this%sweep_points(sweep_t(average_divergence=.true.), 0.0_wp)
-  end subroutine average_cells
+    call this%sweep_points(sweep_t(average_pressure=.true.), 0.0_wp)
+  end subroutine average_pressure
 
   !> Goes once over all points.
   subroutine sweep_points(this, sweep, time_step)
@@ -218,11 +240,16 @@ contains
     type(body_points_t), intent(in) :: body
     integer, intent(in) :: first, last
     type(weights_t) :: w
-    real(wp) :: value(4, BLOCK), gradient(4, BLOCK)
+    real(wp) :: value(4, BLOCK), gradient(4, BLOCK), change(BLOCK)
     integer :: n
 
     n = last - first + 1
     associate (p => this%particles, g => this%grid)
+      if (sweep%average_pressure) then
+        call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), &
+          0.5_wp*(p%sxx(first:last) + p%syy(first:last)))
+        return
+      end if
       call this%find_weights(first, last, w)
       if (sweep%update_stress .or. sweep%average_divergence) then
         call gather_motion_and_gradient(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value, &
@@ -231,27 +258,35 @@ contains
         call gather_motion(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value)
       end if
       if (sweep%average_divergence) then
-        call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), gradient)
+        call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), &
+          gradient(1, :n) + gradient(4, :n))
         return
       end if
       if (sweep%update_velocity) then
         call update_velocity(n, this%flip, value, p%vx(first:last), p%vy(first:last))
       end if
       if (sweep%update_stress) then
-        if (this%averages_cells) call this%cells%replace_divergence(n, p%x(first:last), &
-          p%y(first:last), gradient)
+        if (this%averages_cells) then
+          change(:n) = 0.5_wp*(this%cells%mean(n, p%x(first:last), p%y(first:last)) &
+            - (gradient(1, :n) + gradient(4, :n)))
+          gradient(1, :n) = gradient(1, :n) + change(:n)
+          gradient(4, :n) = gradient(4, :n) + change(:n)
+        end if
         call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
           this%tally%internal_work, this%tally%wave_squared)
-        if (this%stretches_domains) call this%stretch_domains(body, first, last)
       end if
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
           p%x(first:last), &
                          p%y(first:last), this%tally%motion_energy)
         call this%note_block(first, last)
+        ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
+        if (this%stretches_domains) call this%stretch_domains(body, first, last)
         call this%find_weights(first, last, w)
       end if
-      if (sweep%map_momentum .and. sweep%map_force) then
+      if (this%averages_cells .and. sweep%map_force) then
+        call this%average_block(sweep, first, last, w)
+      else if (sweep%map_momentum .and. sweep%map_force) then
         call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
                                     p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
                                     p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
@@ -266,6 +301,26 @@ contains
         this%materials(body%material), first, last, w)
     end associate
   end subroutine sweep_block
+
+  !> Maps a block whose forces come from the pressure of the cells.
+  subroutine average_block(this, sweep, first, last, w)
+    class(solver_t), intent(inout) :: this
+    type(sweep_t), intent(in) :: sweep
+    integer, intent(in) :: first, last
+    type(weights_t), intent(in) :: w
+    real(wp) :: change(last - first + 1)
+    integer :: n
+
+    n = last - first + 1
+    associate (p => this%particles, g => this%grid)
+      change = this%cells%mean(n, p%x(first:last), p%y(first:last)) - 0.5_wp*(p%sxx(first:last) &
+        + p%syy(first:last))
+      if (sweep%map_momentum) call map_momentum(n, w, p%mass(first:last), p%vx(first:last), &
+        p%vy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+      call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change, p%syy(first:last) &
+        + change, p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+    end associate
+  end subroutine average_block
 
   !> Adds the body force of the manufactured solution to the nodes.
   subroutine push_points(this, time_step, material, first, last, w)

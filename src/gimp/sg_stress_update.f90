@@ -6,7 +6,7 @@ module sg_stress_update
   use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power, update_volume
   use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_LINEAR_ELASTIC, &
     MODEL_MOHR_COULOMB, MODEL_NEO_HOOKEAN
-  use sg_mohr_coulomb, only: close_gap, return_stress
+  use sg_mohr_coulomb, only: close_gap, release_open, return_stress
   use sg_neo_hookean, only: find_neo_hookean_stress, neo_hookean_wave_squared, &
     update_deformation
   use sg_particles, only: particles_t
@@ -44,6 +44,8 @@ contains
         call hyperelastic_block(p, material, first, last)
       else
         call update_volume(n, strain, p%volume(first:last))
+        if (material%is_brittle) call release_open(n, material%bulk, p%gap(first:last), &
+          p%sxx(first:last), p%syy(first:last), p%szz(first:last), p%sxy(first:last))
         if (material%model /= MODEL_LINEAR_ELASTIC) call close_gap(n, strain, p%gap(first:last))
         call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), &
           p%syy(first:last), p%szz(first:last), p%sxy(first:last))

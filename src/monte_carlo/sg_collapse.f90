@@ -9,7 +9,7 @@ module sg_collapse
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, outcome_t, reset_outcome, STATUS_ABANDONED, &
-    STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, status_text
+    STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, status_text, STEPS
   use sg_posix, only: make_directory, write_file
   use sg_resolved, only: resolved_text
   use sg_snapshot, only: snapshot_name
@@ -158,7 +158,8 @@ contains
     type(error_t), allocatable :: error
     character(len=:), allocatable :: label, path
 
-    if (outcome%status == STATUS_TIME_LIMIT) return
+    ! One that failed before its first step (in the relaxation) has no state but the scene's.
+    if (outcome%status == STATUS_TIME_LIMIT .or. .not. outcome%values(STEPS) > 0.0_wp) return
     label = trim(this%plan%cases(case_index)%label)
     associate (output => this%config%output)
       path = trim(output%directory)//'/failures/'//snapshot_name(label, id)

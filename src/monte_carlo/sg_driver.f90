@@ -201,6 +201,9 @@ contains
     end do
     if (.not. allocated(error)) call remove_files(director%directory//'/snapshots', '.h5', error)
     if (.not. allocated(error)) call remove_files(director%directory//'/snapshots', '.xdmf', error)
+    if (.not. allocated(error)) call remove_files(director%directory//'/failures', '.h5', error)
+    if (.not. allocated(error)) call remove_files(director%directory//'/failures', '.xdmf', error)
+    if (.not. allocated(error)) call remove_files(director%directory//'/failures', '.nml', error)
   end subroutine clear_directory
 
   !> An error that names the keys when the journal belongs to another run.

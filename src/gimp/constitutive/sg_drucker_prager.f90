@@ -18,6 +18,8 @@ module sg_drucker_prager
 
   !> Guards the division by q, in Pa; where q is 0 so is what it divides.
   real(wp), parameter :: LEAST_Q = 1.0e-100_wp
+  !> A deviator below this share of the stresses involved is rounding: the point is at the tip.
+  real(wp), parameter :: ROUNDING = 1.0e-13_wp
 
 contains
 
@@ -53,7 +55,7 @@ contains
       szz(p) = mean + ratio*dzz + (new_mean - mean)
       sxy(p) = ratio*sxy(p)
       gap(p) = gap(p) + merge((mean - new_mean)/material%bulk, 0.0_wp, &
-        limited .and. .not. new_q > 0.0_wp)
+        limited .and. new_q <= ROUNDING*(abs(mean) + q + material%k))
     end do
   end subroutine return_drucker_prager
 end module sg_drucker_prager

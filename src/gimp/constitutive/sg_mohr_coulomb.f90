@@ -12,8 +12,8 @@
 !> corners, the apex s1 = s2 = s3 = T.
 !>
 !> Gap: at the apex the volumetric strain that makes no stress is kept as `gap` >= 0. While it is
-!> open the point stays at the apex; compression closes the gap first, and only the rest of the
-!> increment builds stress. Without it a grain that flew off would come back with several times its
+!> open the point carries no stress (one that was held by tension lets go of it); compression closes
+!> the gap first, and only the rest of the increment builds stress. Without it a grain that flew off would come back with several times its
 !> volume and full stiffness.
 module sg_mohr_coulomb
   use sg_kinds, only: wp
@@ -23,7 +23,7 @@ module sg_mohr_coulomb
   implicit none
   private
 
-  public :: close_gap, return_stress, return_principal
+  public :: close_gap, release_open, return_stress, return_principal
   public :: REGION_ELASTIC, REGION_PLANE, REGION_EDGE, REGION_CUT_OFF, REGION_APEX
 
   !> Where a trial stress was returned to.
@@ -80,6 +80,26 @@ contains
       gap(p) = merge(max(left, 0.0_wp), 0.0_wp, gap(p) > 0.0_wp)
     end do
   end subroutine close_gap
+
+  !> Points that opened in the step before let go of the tension that held them at the apex; the
+  !> elastic strain that it took, mean stress over `bulk` (Pa), goes into the gap.
+  pure subroutine release_open(n, bulk, gap, sxx, syy, szz, sxy)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: bulk
+    real(wp), intent(inout) :: gap(n), sxx(n), syy(n), szz(n), sxy(n)
+    real(wp) :: kept
+    integer :: p
+
+    !$omp simd private(kept)
+    do p = 1, n
+      kept = merge(0.0_wp, 1.0_wp, gap(p) > 0.0_wp)
+      gap(p) = gap(p) + (1.0_wp - kept)*max(sxx(p) + syy(p) + szz(p), 0.0_wp)/(3.0_wp*bulk)
+      sxx(p) = kept*sxx(p)
+      syy(p) = kept*syy(p)
+      szz(p) = kept*szz(p)
+      sxy(p) = kept*sxy(p)
+    end do
+  end subroutine release_open
 
   !> Returns the trial stresses of `n` points to the yield surface, in place, and adds to the gap
   !> of those at the apex.

@@ -49,7 +49,7 @@ contains
       kappa = next
     end do
     if (change > CONVERGED) then
-      call return_with(plastic_strain)
+      call return_with(merge(plastic_strain, kappa, abs(next - kappa) > CONVERGED))
       next = plastic_strain + plastic_strain_increment(n, material%shear, trial, sxx, syy, szz, sxy)
     end if
     plastic_strain = next

@@ -1,0 +1,225 @@
+"""What no scheme and no weighting function may lose or make: mass, momentum, angular momentum, energy.
+
+Usage: conservation.py SGIMP_EXECUTABLE
+Small scenes are written here and run with every scheme and every weighting function; prints one line for each
+quantity missed and one for the worst of each; exit code 1 if one is missed.
+
+Where the bounds come from:
+  mass              exact: points keep theirs.
+  momentum          rounding, VERIFICATION case 11: 1e-12 of the sum of m |v|. Weights add up to 1 and their
+                    slopes to 0, so internal forces cancel whatever the scheme.
+  friction          Coulomb at every node of a wall bounds the tangential impulse by mu times the normal one,
+                    and points take exactly the impulse that nodes got: to rounding as above.
+  reaction          force times time step is the momentum that points gained in it: to rounding.
+  angular momentum  the place of a node is not the centre of the mass it stands for; what that loses is of
+                    second order in the cell, so half the cell has to leave a quarter. Allowed is a third,
+                    since the edge of a disc of points is a staircase.
+  energy            explicit steps do not conserve it. USL only loses it (Bardenhagen 2002); MUSL and USF make
+                    a little in a collision of soft discs at 8 cells a diameter, most with hat functions, as
+                    their slopes jump between cells. ENERGY has twice what was measured when this was written,
+                    as a share of the peak of kinetic energy. What it is there to find is far larger: walls
+                    that held a rebounding block for its momentum but not for its strain made 0.8.
+"""
+
+import itertools
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from runner import Result
+
+ROUNDING = 1e-12
+FREE = "left='free', right='free', bottom='free', top='free'"
+# Two soft discs that graze each other, one of them spinning.
+DISCS = f"""
+&grid x_min=-0.2, x_max=1.2, y_min=-0.2, y_max=1.2, cell_size=0.05, {FREE} /
+&material name='m', model='linear_elastic', density=1000, young=1000, poisson=0.3 /
+&body name='a', material='m', shape='disc', x=0.3, y=0.35, radius=0.2,
+      velocity=0.1,0.1, angular_velocity=-0.4 /
+&body name='b', material='m', shape='disc', x=0.7, y=0.65, radius=0.2, velocity=-0.1,-0.1 /
+&loading gravity=0,0 /
+&solver {{solver}}, cfl=0.4, end_time=2, settle=0 /
+&output history_interval=0.02 /
+"""
+# A block falls on a wall that it can leave again, slides and bounces.
+BLOCK = """
+&grid x_min=0, x_max=2, y_min=0, y_max=1, cell_size=0.0625,
+      left='free', right='free', bottom='frictional', top='free', bottom_friction=0.3 /
+&material name='m', model='neo_hookean', density=1000, young=1e5, poisson=0.3 /
+&body name='a', material='m', shape='rectangle', x=0.25, y=0.125, width=0.5, height=0.25, velocity=0.5,0 /
+&loading gravity=0,-9.81 /
+&solver {solver}, cfl=0.4, end_time=0.8, settle=0 /
+&output history_interval=0.005 /
+"""
+SAND = """
+&grid x_min=0, x_max=3, y_min=0, y_max=1.25, cell_size=0.125,
+      left='roller', right='roller', bottom='fixed', top='free' /
+&material name='m', model='mohr_coulomb', density=1450, young=1e6, poisson=0.3,
+      friction_angle=33, dilation_angle=3 /
+&body name='a', material='m', shape='rectangle', x=0, y=0, width=0.75, height=1 /
+&loading gravity=0,-9.81 /
+&solver {solver}, cfl=0.4, end_time=0.8, settle=0 /
+&output history_interval=0.01 /
+"""
+# A plate pushes a free block; a row of history for every step.
+PUSHED = f"""
+&grid x_min=0, x_max=2, y_min=0, y_max=1, cell_size=0.0625, {FREE} /
+&material name='m', model='linear_elastic', density=1000, young=1e5, poisson=0.3 /
+&body name='a', material='m', shape='rectangle', x=0.5, y=0.25, width=0.5, height=0.25 /
+&boundary name='plate', x_min=0, x_max=0.5, y_min=0, y_max=1, components='both', velocity=0.2,0.1 /
+&loading gravity=0,0 /
+&solver {{solver}}, time_step=1e-3, end_time=0.2, settle=0 /
+&output history_interval=5e-4 /
+"""
+SPIN = f"""
+&grid x_min=0, x_max=1, y_min=0, y_max=1, cell_size={{cell}}, {FREE} /
+&material name='m', model='neo_hookean', density=1000, young=1e4, poisson=0.3 /
+&body name='a', material='m', shape='disc', x=0.5, y=0.5, radius=0.2, angular_velocity=2 /
+&loading gravity=0,0 /
+&solver {{solver}}, cfl=0.4, end_time=3.14, settle=0 /
+&output history_interval=0.05 /
+"""
+SCHEMES = ("usf", "usl", "musl")
+WEIGHTINGS = ("linear", "gimp", "cpgimp", "bspline")
+# Hat functions with stress last divide by the mass of nodes that a point has just reached: free surfaces run
+# away (Bardenhagen 2002), which is why MUSL exists.
+UNSTABLE = [("usl", "linear")]
+ENERGY = {
+    "discs": {"usl": 0.001, "musl": 0.03, "usf": 0.04, "usf linear": 0.09},
+    "block": {"usl": 0.001, "musl": 0.02, "usf": 0.02},
+    "sand": {"usl": 0.001, "musl": 0.001, "usf": 0.001},
+}
+
+
+def run(executable, directory, scene, **changes):
+    """Runs a scene in which {solver} and the like have been replaced."""
+    case = Path(directory) / "case.nml"
+    case.write_text("&case name='conservation' /" + scene.format(**changes))
+    done = subprocess.run(
+        [executable, case, "--output", Path(directory) / "run", "--overwrite"], capture_output=True, text=True
+    )
+    if done.returncode not in (0, 4):
+        raise RuntimeError(done.stdout + done.stderr)
+    return Result(Path(directory) / "run")
+
+
+def mass_of(result, density):
+    """Total mass in kg/m: all points start undeformed."""
+    return density * result.first.volume.sum()
+
+
+def momentum_scale(result, density):
+    """Sum of m |v| at the start and at the end, the larger."""
+    speeds = [np.linalg.norm(state.velocity, axis=1) for state in (result.first, result.last)]
+    return density * max(np.sum(result.first.volume * speed) for speed in speeds)
+
+
+def energy_rise(history):
+    """Largest rise of kinetic + elastic + potential energy above its start, over the peak of kinetic."""
+    total = history["kinetic_energy"] + history["elastic_energy"] + history["potential_energy"]
+    return (total - total[0]).max() / history["kinetic_energy"].max()
+
+
+def energy_bound(scene, scheme, weighting):
+    """Allowed rise of energy."""
+    bounds = ENERGY[scene]
+    return bounds.get(f"{scheme} {weighting}", bounds[scheme])
+
+
+def judge_discs(result):
+    """Nothing from outside acts on the discs."""
+    momentum = result.history["momentum"]
+    yield "momentum", np.abs(momentum - momentum[0]).max() / momentum_scale(result, 1000), ROUNDING
+
+
+def judge_block(result):
+    """The wall pushes up and against the motion, and friction stays below mu times the push."""
+    momentum, time = result.history["momentum"], result.history["time"]
+    scale, weight = momentum_scale(result, 1000), 9.81 * mass_of(result, 1000)
+    tangential = momentum[0, 0] - momentum[:, 0]
+    normal = momentum[:, 1] - momentum[0, 1] + weight * time
+    yield "impulse of friction beyond Coulomb's", (tangential - 0.3 * normal).max() / scale, ROUNDING
+    yield "pull of the wall", -np.diff(normal).min() / scale, ROUNDING
+    # It has slid and been pushed at all: a wall that does nothing would pass the lines above.
+    yield "share of the sliding that friction left", momentum[-1, 0] / momentum[0, 0], 0.9
+
+
+def judge_sand(result):
+    """Plastic flow takes work and never gives it back."""
+    history = result.history
+    work = np.diff(history["plastic_work"])
+    # What is taken for plastic work is the work of stresses less the change of elastic energy: to rounding.
+    yield "plastic work given back", -work.min() / history["kinetic_energy"].max(), 1e-9
+    yield (
+        "energy that was dissipated (left over)",
+        1 - history["plastic_work"][-1] / -np.diff(history["potential_energy"][[0, -1]]).item(),
+        0.75,
+    )
+
+
+def judge_pushed(result):
+    """Momentum is what the plate gave."""
+    momentum, reaction = result.history["momentum"], result.history["reaction"]
+    gain = momentum[1:] - momentum[:-1] - reaction[1:] * np.diff(result.history["time"])[:, None]
+    yield "momentum without reaction", np.abs(gain).max() / np.abs(momentum).max(), ROUNDING
+    yield "share of the plate's speed not reached", 1 - momentum[-1, 0] / (0.2 * mass_of(result, 1000)), 0.9
+
+
+def judge_all(executable, directory):
+    """Yields (name, quantity, value, allowed) of all scenes."""
+    scenes = {"discs": (DISCS, judge_discs), "block": (BLOCK, judge_block), "sand": (SAND, judge_sand)}
+    for scheme, weighting in itertools.product(SCHEMES, WEIGHTINGS):
+        solver = f"scheme='{scheme}', weighting='{weighting}'"
+        for name, (scene, judge) in scenes.items():
+            if (scheme, weighting) in UNSTABLE and name != "sand":
+                continue
+            # A failed member misses too.
+            result = run(executable, directory, scene, solver=solver)
+            label = f"{name}, {scheme}, {weighting}"
+            yield label, "status", result.row["status"], 0
+            yield label, "mass", abs(result.row["mass_error"]), 0.0
+            rise = energy_rise(result.history)
+            yield label, "energy made", rise, energy_bound(name, scheme, weighting)
+            for quantity, value, allowed in judge(result):
+                yield label, quantity, value, allowed
+        result = run(executable, directory, PUSHED, solver=solver)
+        for quantity, value, allowed in judge_pushed(result):
+            yield f"pushed, {scheme}, {weighting}", quantity, value, allowed
+    for extra in ("flip=0.9", "anti_locking='cell_average'"):
+        result = run(executable, directory, DISCS, solver=f"scheme='musl', weighting='gimp', {extra}")
+        for quantity, value, allowed in judge_discs(result):
+            yield f"discs, {extra}", quantity, value, allowed
+    drift = []
+    for cell in (0.05, 0.025):
+        history = run(executable, directory, SPIN, solver="scheme='usl', weighting='gimp'", cell=cell).history
+        spin = history["angular_momentum"]
+        drift.append(np.abs(spin / spin[0] - 1).max())
+    yield (
+        "spin, usl, gimp",
+        "angular momentum lost with half the cell, of that lost",
+        drift[1] / drift[0],
+        1 / 3,
+    )
+
+
+def main():
+    """Runs and judges all scenes."""
+    executable = Path(sys.argv[1]).resolve()
+    missed, worst = 0, {}
+    with tempfile.TemporaryDirectory() as directory:
+        for name, quantity, value, allowed in judge_all(executable, directory):
+            key = (name.split(",")[0], quantity)
+            if value > worst.get(key, (-np.inf,))[0]:
+                worst[key] = (value, allowed, name)
+            if not value <= allowed:
+                missed += 1
+                print(f"{name}: {quantity}: {value:.2e}, allowed {allowed:.0e}  MISSED")
+    for (scene, quantity), (value, allowed, name) in worst.items():
+        print(f"{scene}: {quantity}: worst {value:.2e} ({name}), allowed {allowed:.0e}")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
