@@ -184,7 +184,6 @@ module sg_schema
     key_t('boundary', 'velocity', KIND_REAL, unit='m/s', default='0 0', size=2, &
     meaning='Prescribed velocity: x, y')]
 
-
   type(key_t), parameter :: BODY_KEYS(*) = [ &
     key_t('body', 'name', KIND_NAME, example='column', required=.true., meaning='Name'), &
     key_t('body', 'material', KIND_NAME, example='sand', required=.true., &

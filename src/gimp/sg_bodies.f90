@@ -41,8 +41,8 @@ contains
   !> Points at the centres of the lattice cells whose centre lies in the body, x fastest. The
   !> lattice starts at the lower left corner of the body's box; its spacing is `cell_size` over the
   !> points per cell, or a little less where the box is no multiple of it.
-  !> Velocities are those of the body with its spin about the centre of its box. `error`: the file of
-  !> points cannot be read.
+  !> Velocities are those of the body with its spin about the centre of its box. `error`: the file
+  !> of points cannot be read.
   subroutine fill_body(body, cell_size, lattice, error)
     type(body_config_t), intent(in) :: body
     real(wp), intent(in) :: cell_size
@@ -107,8 +107,8 @@ contains
     end function whole_number
   end subroutine fill_shape
 
-  !> Is (x, y) in the body? A body given by points has no inside. For polygons by the number of edges crossed to the right (even-odd
-  !> rule).
+  !> Is (x, y) in the body? A body given by points has no inside. For polygons by the number of
+  !> edges crossed to the right (even-odd rule).
   pure function is_inside(body, x, y) result(inside)
     type(body_config_t), intent(in) :: body
     real(wp), intent(in) :: x, y

@@ -1,7 +1,8 @@
 !> Conditions on the velocity of nodes: the four walls and boxes of prescribed velocity.
 !>
 !> A wall holds the nodes on and behind it. With v = (v_n, v_t), n pointing into the material:
-!>   held      v = prescribed velocity, in the components that are held (fixed: both, roller: v_n = 0)
+!>   held      v = prescribed velocity, in the components that are held (fixed: both, roller: the
+!>             normal one, of 0)
 !>   contact   only where the material presses on the wall, v_n < 0: v_n = 0, and friction takes at
 !>             most mu times the normal impulse off v_t (Coulomb; it sticks where that suffices)
 !>
@@ -65,8 +66,8 @@ contains
     end select
   end function create_wall
 
-  !> Prescribed velocity of the nodes in a box of the case file; `origin` is the place of node (0, 0)
-  !> in m. A node that is outside by less than 1e-6 of a cell counts as inside.
+  !> Prescribed velocity of the nodes in a box of the case file; `origin` is the place of node (0,
+  !> 0) in m. A node that is outside by less than 1e-6 of a cell counts as inside.
   pure function create_prescribed(config, origin, cell_size) result(condition)
     type(boundary_config_t), intent(in) :: config
     real(wp), intent(in) :: origin(2), cell_size
@@ -83,8 +84,8 @@ contains
   end function create_prescribed
 
   !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
-  !> mass. `taken`: energy that the nodes lost to them in this step, J/m: force times the mean of the
-  !> velocities before and after the step (the wall pushes while the other forces do).
+  !> mass. `taken`: energy that the nodes lost to them in this step, J/m: force times the mean of
+  !> the velocities before and after the step (the wall pushes while the other forces do).
   pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
     type(condition_t), intent(inout) :: conditions(:)
     !> i_first, i_last, j_first, j_last.

@@ -1,8 +1,8 @@
-!> The remedy for volumetric locking: the volumetric strain rate of a point is the mean over its cell,
-!> and so is the pressure in the plane that its forces come from, both weighted by volume: the two
-!> are conjugate, so that forces do the work that strains receive. (Cell-based averaging as in Mast,
-!> Mackenzie-Helnwein, Arduino, Miller & Shin 2012; the correction is shared by the two directions of
-!> the plane, so that plane strain stays exact.)
+!> The remedy for volumetric locking: the volumetric strain rate of a point is the mean over its
+!> cell, and so is the pressure in the plane that its forces come from, both weighted by volume: the
+!> two are conjugate, so that forces do the work that strains receive. (Cell-based averaging as in
+!> Mast, Mackenzie-Helnwein, Arduino, Miller & Shin 2012; the correction is shared by the two
+!> directions of the plane, so that plane strain stays exact.)
 module sg_cell_average
   use sg_kinds, only: wp
   use sg_weighting, only: axis_t

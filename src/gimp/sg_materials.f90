@@ -107,9 +107,8 @@ contains
 
   !> alpha (on I1) and k of the cone. All have their apex at I1 = 3 c cot(phi), k = 3 alpha c
   !> cot(phi); with s = sin(phi), alpha = s/q:
-  !>   outer, inner              q = sqrt(3) (3 -+ s): the compression and the extension edges
-  !>   equal_area                circle of the area of the hexagon, q = sqrt(2 sqrt(3) pi (9 - s^2))/
-  !>                             (2 sqrt(3))
+  !>   outer, inner              q = sqrt(3)/2 (3 -+ s): the compression and the extension edges
+  !>   equal_area                circle of the area of the hexagon, q^2 = pi (9 - s^2)/(2 sqrt(3))
   !>   plane_strain              same limit load in plane strain with the dilation psi: with
   !>                             alpha_f = sin(psi)/sqrt(9 + 3 sin(psi)^2),
   !>                             q = 3 (sqrt(1 - 3 alpha_f^2) + alpha_f s)

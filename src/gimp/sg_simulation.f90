@@ -132,9 +132,9 @@ contains
     end do
   end subroutine march
 
-  !> The quasi-static stage before time 0: gravity acts on the body under the damping that is critical
-  !> for its slowest wave, 2 omega = pi c/H, held at its toe if it is gated. Ends at rest or after
-  !> relaxation_time; then the gate is gone and the points have their first velocities.
+  !> The quasi-static stage before time 0: gravity acts on the body under the damping that is
+  !> critical for its slowest wave, 2 omega = pi c/H, held at its toe if it is gated. Ends at rest
+  !> or after relaxation_time; then the gate is gone and the points have their first velocities.
   subroutine relax(config, scene, variation, monitor, solver, outcome)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
@@ -391,10 +391,10 @@ contains
     end associate
   end function history_row
 
-  !> Energy that appeared from nowhere since the start (negative: vanished): the change of kinetic and
-  !> potential energy, and what stresses, damping and walls took, as a share of the largest of the
-  !> potential energy released, the peak of kinetic energy, the elastic energy at the start and the
-  !> work of forces.
+  !> Energy that appeared from nowhere since the start (negative: vanished): the change of kinetic
+  !> and potential energy, and what stresses, damping and walls took, as a share of the largest of
+  !> the potential energy released, the peak of kinetic energy, the elastic energy at the start and
+  !> the work of forces.
   function energy_imbalance(config, solver, clock) result(share)
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver

@@ -19,8 +19,8 @@ module sg_solver
   use sg_neo_hookean, only: find_stretch
   use sg_particles, only: body_points_t, particles_t
   use sg_stress_update, only: update_stress, wave_speed_squared
-  use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_body_force, map_force, map_momentum, &
-    map_momentum_and_force
+  use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_body_force, map_force, &
+    map_momentum, map_momentum_and_force
   use sg_weighting, only: axis_weights_interface, BLOCK, bspline_axis_weights, &
     cpgimp_axis_weights, gimp_axis_weights, linear_axis_weights, weights_t
   implicit none
@@ -252,8 +252,8 @@ contains
       end if
       call this%find_weights(first, last, w)
       if (sweep%update_stress .or. sweep%average_divergence) then
-        call gather_motion_and_gradient(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value, &
-          gradient)
+        call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &
+          g%motion_store(g%motion_start), value, gradient)
       else if (sweep%update_velocity) then
         call gather_motion(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value)
       end if
@@ -288,8 +288,8 @@ contains
         call this%average_block(sweep, first, last, w)
       else if (sweep%map_momentum .and. sweep%map_force) then
         call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
-                                    p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-                                    p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+          p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%sxy(first:last), &
+          g%x%last, g%y%last, g%total_store(g%total_start))
       else if (sweep%map_momentum) then
         call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), g%x%last, &
           g%y%last, g%total_store(g%total_start))

@@ -19,9 +19,9 @@ module sg_stress_update
 
 contains
 
-  !> Takes the points `first` to `last`, all of one material, one step further. `gradient` of the velocity in
-  !> 1/s. Adds the work of their stresses to `work` (J/m) and raises `wave_squared`, the largest
-  !> squared wave speed, (m/s)^2.
+  !> Takes the points `first` to `last`, all of one material, one step further. `gradient` of the
+  !> velocity in 1/s. Adds the work of their stresses to `work` (J/m) and raises `wave_squared`, the
+  !> largest squared wave speed, (m/s)^2.
   subroutine update_stress(particles, material, first, last, time_step, gradient, work, &
     wave_squared)
     type(particles_t), intent(inout) :: particles

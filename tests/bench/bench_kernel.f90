@@ -114,8 +114,8 @@ contains
               call solver%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, &
                 w%gy)
             case (2)
-              call gather_motion_and_gradient(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), &
-                value, gradient)
+              call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &
+                g%motion_store(g%motion_start), value, gradient)
             case (3)
               gradient = 0.0_wp
               call update_stress(p, m, first, last, 1.0e-3_wp, gradient, work, wave_squared)

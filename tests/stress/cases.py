@@ -301,7 +301,7 @@ def draw_loading(d, facts, density, speed_of_sound, height, cell):
         "gravity": (gravity * math.sin(tilt), -gravity * math.cos(tilt)),
         "damping": log_between(rest, 0.01, 20.0) if none is None else none,
     }
-    if d["geostatic"] > 0.75 and tilt == 0.0:
+    if d["geostatic"] > 0.75 and tilt == 0.0 and facts["model"] != "neo_hookean":
         loading["initial_stress"] = "geostatic"
     if d["relaxation"] > 0.9:
         loading["relaxation"] = "gated" if d["relaxation"] > 0.95 else "open"

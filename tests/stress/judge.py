@@ -197,9 +197,11 @@ def yield_excess(facts, state):
 def check_energy(label, facts, member, history, last, numbers):
     """Notes the energy that came from nowhere, as a share of the energy that moved.
 
-    created   largest growth of kinetic + elastic + potential energy with what damping and walls took. Plastic work
-              can only lower it. A speed beyond what the energy of the run allows shows up here too.
-    ledger    the same with the work of the stresses at the end: how far the account of the program is from closed
+    created   largest rise, from any earlier time on, of kinetic + elastic + potential energy with what damping
+              took: plastic work and walls at rest only lower it (walls that move are counted with their work).
+              A speed beyond what the energy of the run allows shows up here too.
+    ledger    growth from start to end with the work of stresses and walls: how far the account of the program is
+              from closed
     """
     kinetic, elastic, potential = (history[f"{k}_energy"] for k in ("kinetic", "elastic", "potential"))
     change = potential - potential[0]
@@ -211,9 +213,11 @@ def check_energy(label, facts, member, history, last, numbers):
     scale = (
         max(kinetic.max(), np.abs(change).max(), elastic.max(), np.abs(taken).max()) + floor / ENERGY_SLACK
     )
-    without_plastic = kinetic + elastic + change + taken
-    balance = without_plastic + history["plastic_work"]
-    created = float((without_plastic - without_plastic[0]).max() / scale)
+    free = kinetic + elastic + change + history["damping_work"]
+    if facts.get("boundary"):
+        free = free + history["wall_work"]
+    balance = kinetic + elastic + change + taken + history["plastic_work"]
+    created = float((free - np.minimum.accumulate(free)).max() / scale)
     error = float(balance[-1] - balance[0]) / scale
     numbers["ledger"] = max(numbers.get("ledger", -math.inf), error)
     numbers["lost"] = min(numbers.get("lost", math.inf), error)

@@ -1,7 +1,7 @@
 """A member that fails leaves its first and last good state and a case file that replays the failure."""
 
-import numpy as np
 import h5py
+import numpy as np
 from common import Program, arguments, check
 
 program = Program(arguments())

@@ -15,6 +15,7 @@ import cases_column
 import cases_footing
 import cases_manufactured
 import cases_motion
+import cases_relaxation
 import cases_slope
 import cases_strength
 import numpy as np
@@ -38,6 +39,7 @@ CASES = {
     "frictional_plane": (12, cases_slope.frictional_plane),
     "infinite_slope": (13, cases_slope.infinite_slope),
     "cantilever": (14, cases_beam.cantilever),
+    "relaxed_column": ("-", cases_relaxation.relaxed_column),
     "footing": (15, cases_footing.footing),
 }
 

@@ -13,8 +13,8 @@
 !>
 !> Gap: at the apex the volumetric strain that makes no stress is kept as `gap` >= 0. While it is
 !> open the point carries no stress (one that was held by tension lets go of it); compression closes
-!> the gap first, and only the rest of the increment builds stress. Without it a grain that flew off would come back with several times its
-!> volume and full stiffness.
+!> the gap first, and only the rest of the increment builds stress. Without it a grain that flew off
+!> would come back with several times its volume and full stiffness.
 module sg_mohr_coulomb
   use sg_kinds, only: wp
   use sg_linear_elastic, only: strain_t

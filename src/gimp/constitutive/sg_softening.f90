@@ -1,6 +1,8 @@
-!> Mohr-Coulomb whose strength falls and whose dilation fades with the equivalent plastic strain kappa.
+!> Mohr-Coulomb whose strength falls and whose dilation fades with the equivalent plastic strain
+!> kappa.
 !>
-!>   phi, c   linear from their first values at softening_start to the residual ones at softening_end
+!>   phi, c   linear from their first values at softening_start to the residual ones at
+!>            softening_end
 !>   psi      linear from its first value at 0 to nothing at dilation_end; never above phi, where
 !>            plastic flow would give energy back
 !> The strength that returns a stress is that at the end of the step: kappa = kappa_n + dkappa(phi,
@@ -81,7 +83,8 @@ contains
     end subroutine return_with
   end subroutine return_softening
 
-  !> sqrt(2/3 e:e) with e = dev(trial - returned)/(2 G): the growth of the equivalent plastic strain.
+  !> sqrt(2/3 e:e) with e = dev(trial - returned)/(2 G): the growth of the equivalent plastic
+  !> strain.
   pure function plastic_strain_increment(n, shear, trial, sxx, syy, szz, sxy) result(increment)
     integer, intent(in) :: n
     real(wp), intent(in) :: shear, trial(n, 4), sxx(n), syy(n), szz(n), sxy(n)
