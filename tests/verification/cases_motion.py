@@ -78,7 +78,7 @@ def spinning_disc(bench):
         drift[scheme, size] = spin[-1] / spin[0] - 1.0
     exact = 0.5 * 1000.0 * np.pi
     yield close(
-        "angular momentum at the start, kg m/s", exact, spin[0], 4e-3, "twice the error of the area, 0.2 %"
+        "angular momentum at the start, kg m/s", exact, spin[0], 2e-3, "twice the error of the area, 0.1 %"
     )
     yield small("drift in a turn, usl, 20 cells a radius", drift["usl", 0.05], 1.0, 0.01, "demand 1 % a turn")
     yield small(
