@@ -1,8 +1,9 @@
 """Cases of the stress sweep: a designed sample of the space of inputs, and a list of awkward ones by hand.
 
 A case is a dictionary: name, groups (what it is counted under), text (its namelist), files (name -> text,
-beside it), expect (exit codes that are right) and what the judge must know of it. Lengths in the design are in
-cells, speeds in wave speeds, so that no case needs more than a few hundred steps, however stiff its material.
+beside it), expect (exit codes that are right) and what the judge must know of it. Lengths in the design are
+in cells, speeds in wave speeds, so that no case needs more than a few hundred steps, however stiff its
+material.
 """
 
 import itertools
@@ -23,8 +24,8 @@ COMBINATIONS = tuple(itertools.product(MODELS, WEIGHTINGS, SCHEMES))
 
 # The coordinates of the design, one number in [0, 1) each. Append only: an inserted one changes every case.
 COORDINATES = (
-    "friction dilation cohesion tension young poisson density strength cov scale acf field method distribution "
-    "aspect area points cfl damping speed heading drop offset whole shape steps weight tilt "
+    "friction dilation cohesion tension young poisson density strength cov scale acf field method "
+    "distribution aspect area points cfl damping speed heading drop offset whole shape steps weight tilt "
     "left right bottom top friction_left friction_bottom margin_x margin_y cell origin geostatic flip settle "
     "softening residual softening_end dilation_end cone anti_locking spin boundary boundary_speed relaxation "
     "fixed_step shuffle"

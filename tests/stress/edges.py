@@ -1,7 +1,7 @@
 """Awkward cases by hand, each with the exit codes that are right for it.
 
-The base is a block of 2 x 2 m on a grid of 8 x 4 m with cells of 0.5 m; a case says what differs. A key with the value
-None is left out, a group with the value None too.
+The base is a block of 2 x 2 m on a grid of 8 x 4 m with cells of 0.5 m; a case says what differs. A key with
+the value None is left out, a group with the value None too.
 """
 
 import copy
@@ -192,7 +192,8 @@ def places():
     yield variant("beyond_by_rounding", OK, body={"x": 6.0 + 1e-13})
     far = {"x_min": 1e6, "x_max": 1e6 + 8.0, "y_min": -1e6, "y_max": -1e6 + 4.0}
     yield variant("far_away", OK, grid=far, body={"x": 1e6, "y": -1e6})
-    # Here positions are known to a thousandth of a cell only: refused, failed or merely inexact, but no crash.
+    # Here positions are known to a thousandth of a cell only: refused, failed or merely inexact, but no
+    # crash.
     further = {"x_min": 1e12, "x_max": 1e12 + 8.0}
     yield variant("very_far_away", (0, 2, 4), grid=further, body={"x": 1e12})
 
