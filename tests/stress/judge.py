@@ -62,6 +62,8 @@ def judge(case, code, message, directory):
             return "failed", "; ".join(sorted({member["reason"] for member in failed.values()})), numbers
     except Broken as error:
         return "broken", str(error), numbers
+    except (OSError, KeyError, IndexError, ValueError) as error:
+        return "broken", f"files that cannot be read: {type(error).__name__}: {error}", numbers
     # Stress in rate form stores energy to first order in strain only.
     if numbers["created"] > ENERGY_SLACK + numbers["compression"]:
         return "gained", f"created {numbers['created']:+.3g}, ledger {numbers['ledger']:+.3g}", numbers
@@ -119,6 +121,11 @@ def check_member(case, label, member, directory, numbers):
         check_finite(label, file, has_angle)
         names = sorted(name for name in file if name.startswith("step_"))
         first, last = ({k: v[()] for k, v in file[name].items()} for name in (names[0], names[-1]))
+        for name in names:
+            if len(file[name]["volume"]) != len(first["volume"]):
+                raise Broken(
+                    f"{label}: {len(first['volume'])} points at first, {len(file[name]['volume'])} in {name}"
+                )
         lowest = min(float((file[name]["volume"][()] / first["volume"]).min()) for name in names)
         history = {k: v[()] for k, v in file["history"].items()}
     check_state(label, facts, member, first, last)
@@ -142,8 +149,6 @@ def check_finite(label, file, has_angle):
 
 def check_state(label, facts, member, first, last):
     """All points are there, in the grid, with a volume, and on the right side of their yield surface."""
-    if len(first["volume"]) != len(last["volume"]):
-        raise Broken(f"{label}: {len(first['volume'])} points at the start, {len(last['volume'])} at the end")
     x_min, x_max, y_min, y_max = facts["grid"]
     x, y = last["position"].T
     margin = MARGIN * facts["cell"]
