@@ -82,6 +82,7 @@ def make_case(name, scheme, weighting, cfl):
         "tension": 0.0,
         "cfl": cfl,
         "cell": scene["grid"]["cell_size"],
+        "cells": scene["body"]["width"] / scene["grid"]["cell_size"],
         "grid": [0.0, scene["grid"]["x_max"], 0.0, scene["grid"]["y_max"]],
         "gravity": scene["loading"]["gravity"],
     }
