@@ -145,7 +145,8 @@ contains
     touch = TOUCH_NONE
     if (.not. this%sign*before(this%normal) < 0.0_wp) return
     touch = TOUCH_SLIPS
-    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) touch = TOUCH_STICKS
+    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) &
+      touch = TOUCH_STICKS
   end function touch_of
 
   !> Velocity of one node after condition `this`.
@@ -169,8 +170,8 @@ contains
     end if
   end subroutine constrain
 
-  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and those
-  !> that a wall with contact held in the last momentum balance. (To cut
+  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and
+  !> those that a wall with contact held in the last momentum balance. (To cut
   !> off the motion into the wall alone would make a mean motion out of it out of any noise.)
   pure subroutine hold_conditions(conditions, window, nx, ny, motion)
     type(condition_t), intent(in) :: conditions(:)
