@@ -145,8 +145,9 @@ contains
     touch = TOUCH_NONE
     if (.not. this%sign*before(this%normal) < 0.0_wp) return
     touch = TOUCH_SLIPS
-    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) &
+    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) then
       touch = TOUCH_STICKS
+    end if
   end function touch_of
 
   !> Velocity of one node after condition `this`.
