@@ -97,8 +97,10 @@ contains
   end function create_prescribed
 
   !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
-  !> mass. `taken`: energy that the nodes lost to them in this step, J/m: force times the mean of
-  !> the velocities before and after the step (the wall pushes while the other forces do).
+  !> mass. `taken`: energy that the nodes lost to them in this step, J/m. In each constrained
+  !> component that is m/2 (old^2 - after^2) + m (before - old) after: forces work with the velocity
+  !> that strains the points, the constrained one, so a wall at rest takes the kinetic energy that
+  !> points carry into its nodes, and nothing else.
   pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
     type(condition_t), intent(inout) :: conditions(:)
     !> i_first, i_last, j_first, j_last.
@@ -126,7 +128,8 @@ contains
             motion(3:4, i, j) = after
             motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
             this%impulse = this%impulse + total(1, i, j)*(after - before)
-            taken = taken - 0.5_wp*total(1, i, j)*dot_product(after - before, old + after)
+            taken = taken + total(1, i, j)*sum(0.5_wp*(old**2 - after**2) + (before - old)*after, &
+              mask=abs(after - before) > 0.0_wp)
           end do
         end do
       end associate
@@ -142,7 +145,9 @@ contains
     touch = TOUCH_NONE
     if (.not. this%sign*before(this%normal) < 0.0_wp) return
     touch = TOUCH_SLIPS
-    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) touch = TOUCH_STICKS
+    if (this%friction > 0.0_wp .and. .not. abs(after(3 - this%normal)) > 0.0_wp) then
+      touch = TOUCH_STICKS
+    end if
   end function touch_of
 
   !> Velocity of one node after condition `this`.
@@ -166,8 +171,8 @@ contains
     end if
   end subroutine constrain
 
-  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and those
-  !> that a wall with contact held in the last momentum balance. (To cut
+  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and
+  !> those that a wall with contact held in the last momentum balance. (To cut
   !> off the motion into the wall alone would make a mean motion out of it out of any noise.)
   pure subroutine hold_conditions(conditions, window, nx, ny, motion)
     type(condition_t), intent(in) :: conditions(:)

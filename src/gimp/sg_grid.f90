@@ -98,6 +98,7 @@ contains
     type(boundary_config_t), intent(in) :: boundaries(:)
     real(wp), intent(in) :: stretch, least_point_mass
     type(condition_t) :: walls(4)
+    logical :: may_lift(4)
     integer :: nodes, k
 
     this%cell_size = config%cell_size*(1.0_wp + stretch)
@@ -111,7 +112,8 @@ contains
         -1.0_wp)
       walls(3) = create_wall(config%bottom, config%bottom_friction, [0, nx, 0, GHOST], 2, 1.0_wp)
       walls(4) = create_wall(config%top, config%top_friction, [0, nx, ny - GHOST, ny], 2, -1.0_wp)
-      this%conditions = [pack(walls, .not. walls%is_contact()), pack(walls, walls%is_contact())]
+      may_lift = walls%is_contact()
+      this%conditions = [pack(walls, mask=.not. may_lift), pack(walls, mask=may_lift)]
       do k = 1, size(boundaries)
         this%conditions = [this%conditions, create_prescribed(boundaries(k), [this%x%origin, &
           this%y%origin], this%cell_size)]

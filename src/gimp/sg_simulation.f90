@@ -11,7 +11,8 @@ module sg_simulation
     FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
     RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_ENERGY_CREATED, &
-    STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
+    STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, &
+    STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle

@@ -1,8 +1,9 @@
 """Cases of the stress sweep: a designed sample of the space of inputs, and a list of awkward ones by hand.
 
 A case is a dictionary: name, groups (what it is counted under), text (its namelist), files (name -> text,
-beside it), expect (exit codes that are right) and what the judge must know of it. Lengths in the design are in
-cells, speeds in wave speeds, so that no case needs more than a few hundred steps, however stiff its material.
+beside it), expect (exit codes that are right) and what the judge must know of it. Lengths in the design are
+in cells, speeds in wave speeds, so that no case needs more than a few hundred steps, however stiff its
+material.
 """
 
 import itertools
@@ -23,8 +24,8 @@ COMBINATIONS = tuple(itertools.product(MODELS, WEIGHTINGS, SCHEMES))
 
 # The coordinates of the design, one number in [0, 1) each. Append only: an inserted one changes every case.
 COORDINATES = (
-    "friction dilation cohesion tension young poisson density strength cov scale acf field method distribution "
-    "aspect area points cfl damping speed heading drop offset whole shape steps weight tilt "
+    "friction dilation cohesion tension young poisson density strength cov scale acf field method "
+    "distribution aspect area points cfl damping speed heading drop offset whole shape steps weight tilt "
     "left right bottom top friction_left friction_bottom margin_x margin_y cell origin geostatic flip settle "
     "softening residual softening_end dilation_end cone anti_locking spin boundary boundary_speed relaxation "
     "fixed_step shuffle"
@@ -75,12 +76,12 @@ def wave_modulus(young, poisson):
 
 def designed_case(index, u):
     """Case `index` from its point u of the design."""
-    d = dict(zip(COORDINATES, u, strict=True))
+    d = dict(zip(COORDINATES, map(float, u), strict=True))
     model, weighting, scheme = COMBINATIONS[index % len(COMBINATIONS)]
     material, facts = draw_material(model, d)
     cell = log_between(d["cell"], 0.02, 2.0)
     speed_of_sound = math.sqrt(facts["modulus"] / material["density"])
-    body, grid, files, height = draw_geometry(d, cell, index)
+    body, grid, files, size = draw_geometry(d, cell, index)
     mach, rest = share(d["speed"], 0.4, 0.0)
     mach = log_between(rest, 1e-3, 1.0) if mach is None else mach
     heading = 2 * math.pi * d["heading"]
@@ -88,7 +89,7 @@ def designed_case(index, u):
     if d["spin"] > 0.85:
         # The rim at up to a fifth of the wave speed.
         body["angular_velocity"] = (d["spin"] - 0.925) / 0.075 * 0.2 * speed_of_sound / (cell * 5)
-    loading = draw_loading(d, facts, material["density"], speed_of_sound, height * cell, cell)
+    loading = draw_loading(d, facts, material["density"], speed_of_sound, size[1] * cell, cell)
     cfl = 0.05 + 0.95 * d["cfl"]
     steps = (
         log_between(d["steps"] / 0.15, 1, 100)
@@ -126,6 +127,7 @@ def designed_case(index, u):
         weighting=weighting,
         cfl=cfl,
         cell=cell,
+        cells=max(1.0, math.sqrt(size[0] * size[1])),
         grid=[grid[k] for k in ("x_min", "x_max", "y_min", "y_max")],
         gravity=loading["gravity"],
         boundary=has_boundary,
@@ -222,7 +224,7 @@ def draw_material(model, d):
 
 
 def draw_geometry(d, cell, index):
-    """&body and &grid, the points file if there is one, and the height of the body in cells."""
+    """&body and &grid, the points file if there is one, and width and height of the body in cells."""
     points = 1 + int(5 * d["points"])
     area = log_between(d["area"], 1.0, MOST_POINTS / points**2)
     aspect = log_between(d["aspect"], 0.1, 10.0)
@@ -276,7 +278,7 @@ def draw_geometry(d, cell, index):
         del body["points_per_cell"]
         body |= {"shape": "points", "file": "points.csv"}
         files["points.csv"] = points_file(x, y, w, h, cell / points, index)
-    return body, grid, files, height
+    return body, grid, files, (width, height)
 
 
 def points_file(x, y, width, height, spacing, seed):

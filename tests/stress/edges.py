@@ -1,11 +1,12 @@
 """Awkward cases by hand, each with the exit codes that are right for it.
 
-The base is a block of 2 x 2 m on a grid of 8 x 4 m with cells of 0.5 m; a case says what differs. A key with the value
-None is left out, a group with the value None too.
+The base is a block of 2 x 2 m on a grid of 8 x 4 m with cells of 0.5 m; a case says what differs. A key with
+the value None is left out, a group with the value None too.
 """
 
 import copy
 import itertools
+import math
 
 from cases import ACFS, METHODS, MODELS, RESIDUAL, SCHEMES, WEIGHTINGS, finish, group, wave_modulus
 
@@ -70,7 +71,9 @@ def variant(name, expect, files=None, extra="", **changes):
         "cohesion": material.get("cohesion", 0.0),
         "tension": material.get("tension_strength", 0.0),
         "cfl": groups["solver"].get("cfl", 0.4),
+        "weighting": groups["solver"].get("weighting", "gimp"),
         "cell": grid["cell_size"],
+        "cells": max(1.0, math.sqrt(math.prod(body_size(groups["body"]))) / CELL),
         "grid": [grid[k] for k in ("x_min", "x_max", "y_min", "y_max")],
         "gravity": groups["loading"].get("gravity", (0.0, -9.81)),
         "boundary": "boundary" in groups,
@@ -80,6 +83,12 @@ def variant(name, expect, files=None, extra="", **changes):
     if "softening" in material:
         facts["residual"] = [material.get(key, 0.0) for key in RESIDUAL]
     return finish(name, text, facts, ["by hand"], files or {}, expect, groups["solver"]["end_time"])
+
+
+def body_size(body):
+    """Width and height of a body in m; of one point where a file or a list of corners says it."""
+    diameter = 2 * body.get("radius", CELL / 2)
+    return [body[key] or diameter for key in ("width", "height")]
 
 
 def model_keys(model):
@@ -192,7 +201,8 @@ def places():
     yield variant("beyond_by_rounding", OK, body={"x": 6.0 + 1e-13})
     far = {"x_min": 1e6, "x_max": 1e6 + 8.0, "y_min": -1e6, "y_max": -1e6 + 4.0}
     yield variant("far_away", OK, grid=far, body={"x": 1e6, "y": -1e6})
-    # Here positions are known to a thousandth of a cell only: refused, failed or merely inexact, but no crash.
+    # Here positions are known to a thousandth of a cell only: refused, failed or merely inexact, but no
+    # crash.
     further = {"x_min": 1e12, "x_max": 1e12 + 8.0}
     yield variant("very_far_away", (0, 2, 4), grid=further, body={"x": 1e12})
 
