@@ -98,7 +98,8 @@ contains
 
   !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
   !> mass. `taken`: energy that the nodes lost to them in this step, J/m. In each constrained
-  !> component that is m/2 (old^2 - after^2) + m (before - old) after: forces work with the velocity
+  !> component that is m/2 (old^2 - after^2) + m (free - old) after, free being the velocity without
+  !> any condition, after the one with all of them: forces work with the velocity
   !> that strains the points, the constrained one, so a wall at rest takes the kinetic energy that
   !> points carry into its nodes, and nothing else.
   pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
@@ -107,13 +108,12 @@ contains
     integer, intent(in) :: window(4)
     real(wp), intent(in) :: least_mass
     integer, intent(in) :: nx, ny
-    real(wp), intent(in) :: total(8, 0:nx, 0:ny)
-    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
+    !> Comes with zeros in total(4); the forces, total(5:6), are not kept.
+    real(wp), intent(inout) :: total(8, 0:nx, 0:ny), motion(4, 0:nx, 0:ny)
     real(wp), intent(out) :: taken
     real(wp) :: old(2), before(2), after(2)
     integer :: c, i, j
 
-    taken = 0.0_wp
     do c = 1, size(conditions)
       associate (this => conditions(c))
         this%impulse = 0.0_wp
@@ -122,14 +122,28 @@ contains
             if (this%kind == KIND_CONTACT) this%touch(i, j) = TOUCH_NONE
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
-            old = before - motion(1:2, i, j)
+            ! What the node would do without any condition stays where its force was.
+            if (.not. total(4, i, j) > 0.0_wp) total(4:6, i, j) = [1.0_wp, before]
             call constrain(this, before, after)
             if (this%kind == KIND_CONTACT) this%touch(i, j) = touch_of(this, before, after)
             motion(3:4, i, j) = after
             motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
             this%impulse = this%impulse + total(1, i, j)*(after - before)
-            taken = taken + total(1, i, j)*sum(0.5_wp*(old**2 - after**2) + (before - old)*after, &
-              mask=abs(after - before) > 0.0_wp)
+          end do
+        end do
+      end associate
+    end do
+    taken = 0.0_wp
+    do c = 1, size(conditions)
+      associate (box => conditions(c)%box)
+        do j = max(box(3), window(3)), min(box(4), window(4))
+          do i = max(box(1), window(1)), min(box(2), window(2))
+            if (.not. total(4, i, j) > 0.0_wp) cycle
+            total(4, i, j) = 0.0_wp
+            after = motion(3:4, i, j)
+            old = after - motion(1:2, i, j)
+            taken = taken + total(1, i, j)*sum(0.5_wp*(old**2 - after**2) + (total(5:6, i, j) &
+              - old)*after, mask=abs(after - total(5:6, i, j)) > 0.0_wp)
           end do
         end do
       end associate
