@@ -287,7 +287,8 @@ contains
         .and. clock%time < config%solver%end_time) then
         p = maxloc(s%volume/s%mass, dim=1)
         call fail(STATUS_STEP_COLLAPSE, p, 'time step fell to '//to_text(clock%time_step, 4)//' s')
-      else if (mod(clock%step, STEPS_PER_LEDGER) == 0) then
+      else if (mod(clock%step, STEPS_PER_LEDGER) == 0 &
+               .or. clock%time >= config%solver%end_time) then
         created = energy_created(config, solver, clock)
         if (created > MOST_CREATED) then
           p = maxloc(s%vx**2 + s%vy**2, dim=1)
