@@ -128,7 +128,7 @@ def table(records):
         rows = groups[name]
         count = collections.Counter(row["verdict"] for row in rows)
         counts = " ".join(f"{count[verdict]:>8}" for verdict in VERDICTS)
-        # Of the runs that count as good; stress in rate form does not keep its energy under large compression.
+        # Of the good runs; under large compression stress in rate form does not keep its energy.
         good = [row["numbers"] for row in rows if row["verdict"] == "ok"]
         numbers = [number for number in good if number["compression"] < MOST_COMPRESSION]
         extremes = ""
