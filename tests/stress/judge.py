@@ -225,6 +225,7 @@ def check_energy(label, facts, member, history, last, numbers):
     created   largest rise, from any earlier time on, of kinetic + elastic + potential energy with what
               damping took: plastic work and walls at rest only lower it (walls that move are counted with
               their work). A speed beyond what the energy of the run allows shows up here too.
+    net       largest rise above the start
     ledger    growth from start to end with the work of stresses and walls: how far the account of the
               program is from closed
     """
@@ -246,11 +247,13 @@ def check_energy(label, facts, member, history, last, numbers):
         free = free + history["wall_work"]
     balance = kinetic + elastic + change + taken + history["plastic_work"]
     created = float((free - np.minimum.accumulate(free)).max() / scale)
+    net = float((free - free[0]).max() / scale)
     error = float(balance[-1] - balance[0]) / scale
     numbers["ledger"] = max(numbers.get("ledger", -math.inf), error)
     numbers["lost"] = min(numbers.get("lost", math.inf), error)
     numbers["reported"] = max(numbers.get("reported", -math.inf), member["energy_error"])
     numbers["created"] = max(numbers.get("created", -math.inf), created)
+    numbers["net"] = max(numbers.get("net", -math.inf), net)
     numbers["steps"] = max(numbers.get("steps", 0), member["steps"])
     numbers["seconds"] = numbers.get("seconds", 0.0) + member["seconds"]
     numbers["swelling"] = float(last["volume"].max() / last["volume"].mean())
