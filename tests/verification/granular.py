@@ -25,7 +25,7 @@ import h5py
 import numpy as np
 from runner import change_keys, read_namelist
 
-# Angle of repose of the sand, in degrees: the middle of the range of 30 to 31 that is given for it.
+# Angle of repose of the sand, in degrees: the middle of 30 to 31, taken over and not read from the source.
 REPOSE = 30.5
 # In simple shear without change of volume the directions of stress and of strain rate agree, so shear over normal
 # stress on the plane of shear is sin(phi), not tan(phi). A slope at repose flows so: sin(phi) = tan(repose).
@@ -202,7 +202,7 @@ def mobilised(store, angle):
 
 
 def run_shear(store, options):
-    """Which friction a layer mobilises: near sin(phi), far from tan(phi)."""
+    """Which friction a layer mobilises at one cell size. It falls with the cells: no reading of an angle."""
     table = Table(
         options.runs / "shear.csv",
         "friction angle",
