@@ -75,33 +75,42 @@ contains
     type(axis_t), intent(in) :: axis
     integer, intent(inout) :: base(BLOCK)
     real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
-    real(wp) :: w, half, half_inverse_width, slope, left, f, u, d, s0, s2, g0, g2
-    integer :: p, k
+    real(wp) :: w, half_inverse_width, slope
+    integer :: p
 
     w = width(1)*axis%inverse_cell
-    half = 0.5_wp*w
     half_inverse_width = 0.5_wp/w
     slope = axis%inverse_cell/w
-    !$omp simd private(left, k, f, u, d, s0, s2, g0, g2)
+    !$omp simd
     do p = 1, n
-      left = (x(p) - axis%origin)*axis%inverse_cell - half
-      k = min(max(floor(left), 0), axis%last_base)
-      f = left - real(k, wp)
-      u = max(0.0_wp, f + w - 1.0_wp)
-      d = max(0.0_wp, 1.0_wp - f - w)
-      s0 = ((1.0_wp - f)*(1.0_wp - f) - d*d)*half_inverse_width
-      s2 = u*u*half_inverse_width
-      g2 = u*slope
-      g0 = g2 - axis%inverse_cell
-      base(p) = k
-      s(p, 1) = s0
-      s(p, 2) = 1.0_wp - s0 - s2
-      s(p, 3) = s2
-      g(p, 1) = g0
-      g(p, 2) = -(g0 + g2)
-      g(p, 3) = g2
+      call domain_weights(x(p), w, half_inverse_width, slope, axis, base(p), s(p, 1), s(p, 2), &
+        s(p, 3), g(p, 1), g(p, 2), g(p, 3))
     end do
   end subroutine gimp_axis_weights
+
+  !> The three weights and slopes of one point at `x` (m) whose domain is `w` cells wide; see the
+  !> head of the module. `half_inverse_width` = 1/(2w) and `slope` = 1/(w h) come from outside, where
+  !> they can be found once for many points.
+  pure subroutine domain_weights(x, w, half_inverse_width, slope, axis, base, s0, s1, s2, g0, g1, &
+    g2)
+    real(wp), intent(in) :: x, w, half_inverse_width, slope
+    type(axis_t), intent(in) :: axis
+    integer, intent(inout) :: base
+    real(wp), intent(inout) :: s0, s1, s2, g0, g1, g2
+    real(wp) :: left, f, u, d
+
+    left = (x - axis%origin)*axis%inverse_cell - 0.5_wp*w
+    base = min(max(floor(left), 0), axis%last_base)
+    f = left - real(base, wp)
+    u = max(0.0_wp, f + w - 1.0_wp)
+    d = max(0.0_wp, 1.0_wp - f - w)
+    s0 = ((1.0_wp - f)*(1.0_wp - f) - d*d)*half_inverse_width
+    s2 = u*u*half_inverse_width
+    s1 = 1.0_wp - s0 - s2
+    g2 = u*slope
+    g0 = g2 - axis%inverse_cell
+    g1 = -(g0 + g2)
+  end subroutine domain_weights
 
   !> cpGIMP: the width of each point counts, between LEAST_WIDTH and one cell.
   pure subroutine cpgimp_axis_weights(n, x, width, axis, base, s, g)
@@ -110,29 +119,14 @@ contains
     type(axis_t), intent(in) :: axis
     integer, intent(inout) :: base(BLOCK)
     real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
-    real(wp) :: w, inverse_width, left, f, u, d, s0, s2, g0, g2
-    integer :: p, k
+    real(wp) :: w
+    integer :: p
 
-    !$omp simd private(w, inverse_width, left, k, f, u, d, s0, s2, g0, g2)
+    !$omp simd private(w)
     do p = 1, n
       w = min(max(width(p)*axis%inverse_cell, LEAST_WIDTH), 1.0_wp)
-      inverse_width = 1.0_wp/w
-      left = (x(p) - axis%origin)*axis%inverse_cell - 0.5_wp*w
-      k = min(max(floor(left), 0), axis%last_base)
-      f = left - real(k, wp)
-      u = max(0.0_wp, f + w - 1.0_wp)
-      d = max(0.0_wp, 1.0_wp - f - w)
-      s0 = 0.5_wp*((1.0_wp - f)*(1.0_wp - f) - d*d)*inverse_width
-      s2 = 0.5_wp*u*u*inverse_width
-      g2 = u*axis%inverse_cell*inverse_width
-      g0 = g2 - axis%inverse_cell
-      base(p) = k
-      s(p, 1) = s0
-      s(p, 2) = 1.0_wp - s0 - s2
-      s(p, 3) = s2
-      g(p, 1) = g0
-      g(p, 2) = -(g0 + g2)
-      g(p, 3) = g2
+      call domain_weights(x(p), w, 0.5_wp/w, axis%inverse_cell/w, axis, base(p), s(p, 1), &
+        s(p, 2), s(p, 3), g(p, 1), g(p, 2), g(p, 3))
     end do
   end subroutine cpgimp_axis_weights
 
