@@ -4,7 +4,7 @@
 !> than wall time;
 !> judges nothing.
 program bench_kernel
-  use, intrinsic :: iso_fortran_env, only: error_unit
+  use case_file, only: read_case, stop_on_error
   use sg_config, only: config_t
   use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
@@ -12,8 +12,6 @@ program bench_kernel
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: outcome_t, reset_outcome, STEPS
-  use sg_posix, only: read_text
-  use sg_read_config, only: read_config
   use sg_scene, only: build_scene, scene_t
   use sg_simulation, only: simulate, variation_t
   use sg_solver, only: solver_t
@@ -27,18 +25,14 @@ program bench_kernel
   type(scene_t) :: scene
   type(error_t), allocatable :: error
   character(len=512) :: argument
-  character(len=:), allocatable :: text
   integer :: k
 
   call get_command_argument(1, argument)
-  call read_text(trim(argument), text, error)
-  call stop_on_error()
-  call read_config(text, trim(argument), config, error)
-  call stop_on_error()
+  call read_case(trim(argument), config)
   call get_command_argument(2, argument)
   if (argument /= '') read (argument, *) config%solver%end_time
   call build_scene(config, scene, error)
-  call stop_on_error()
+  call stop_on_error(error)
   print '(a, i0, a, f6.3, a)', 'points ', scene%particles%count, ', cells of ', &
     config%grid%cell_size, ' m'
   do k = 1, size(SCHEMES)
@@ -47,12 +41,6 @@ program bench_kernel
   call time_phases()
 
 contains
-
-  subroutine stop_on_error()
-    if (.not. allocated(error)) return
-    write (error_unit, '(a)') error%message
-    stop 2
-  end subroutine stop_on_error
 
   !> A whole run; the flowing phase costs more than the first steps.
   subroutine time_run(scheme)

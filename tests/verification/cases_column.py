@@ -1,12 +1,7 @@
 """Cases 8, 9 and 10: bars and columns that vary along one axis."""
 
 import numpy as np
-from judge import at_least, at_most, close, note, small
-
-
-def order_of(sizes, errors):
-    """Slope of log error over log size, by least squares."""
-    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+from judge import at_least, at_most, close, note, order_of, small
 
 
 def column_changes(cells, **others):

@@ -1,7 +1,7 @@
 """Case 7: order of convergence on the manufactured solution, for every scheme and weighting."""
 
 import numpy as np
-from judge import at_least, at_most, note
+from judge import at_least, at_most, note, order_of
 
 YOUNG, DENSITY = 1.0e7, 1000.0
 END = 0.02
@@ -95,7 +95,7 @@ def manufactured(bench):
                     )
                     errors.append(error_of(result, amplitude))
                     seconds += result.row["seconds"]
-                order = np.polyfit(np.log(1 / np.array(CELLS)), np.log(errors), 1)[0]
+                order = order_of(1 / np.array(CELLS), errors)
                 what = f"order, {scheme} {weighting}, G = {amplitude:g} m"
                 cost = f"error {errors[-1]:.2g} G at {CELLS[-1]} cells, {seconds:.1f} s in all"
                 if weighting == "linear" and amplitude == LARGE:

@@ -22,13 +22,12 @@ Where the bounds come from:
 """
 
 import itertools
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from runner import Result
+from runner import run_namelist
 
 ROUNDING = 1e-12
 FREE = "left='free', right='free', bottom='free', top='free'"
@@ -97,12 +96,7 @@ def run(executable, directory, scene, **changes):
     """Runs a scene in which {solver} and the like have been replaced."""
     case = Path(directory) / "case.nml"
     case.write_text("&case name='conservation' /" + scene.format(**changes))
-    done = subprocess.run(
-        [executable, case, "--output", Path(directory) / "run", "--overwrite"], capture_output=True, text=True
-    )
-    if done.returncode not in (0, 4):
-        raise RuntimeError(done.stdout + done.stderr)
-    return Result(Path(directory) / "run")
+    return run_namelist(executable, case, Path(directory) / "run", (0, 4))
 
 
 def mass_of(result, density):

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from runner import change_keys, read_namelist
+from runner import change_keys, namelist_text, read_namelist
 
 # Angle of repose of the sand, in degrees: the middle of 30 to 31, taken over and not read from the source.
 REPOSE = 30.5
@@ -104,8 +104,7 @@ class Store:
         """The members of `case`.nml with `changes`."""
         groups = read_namelist(self.inputs / f"{case}.nml")
         change_keys(groups, changes)
-        lines = [f"&{name} " + ", ".join(f"{k}={v}" for k, v in keys.items()) for name, keys in groups]
-        members = Members(self.complete(case, " /\n".join([*lines, ""])), unit)
+        members = Members(self.complete(case, namelist_text(groups)), unit)
         self.versions.add(members.version)
         return members
 

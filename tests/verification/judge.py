@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Check:
@@ -52,3 +54,8 @@ def at_least(quantity, limit, ours, why):
 def at_most(quantity, limit, ours, why):
     """The error is the excess."""
     return Check(quantity, f"at most {limit:g}", f"{ours:.4g}", max(0.0, ours - limit), 0.0, why)
+
+
+def order_of(sizes, errors):
+    """Slope of log error over log size, by least squares."""
+    return np.polyfit(np.log(sizes), np.log(errors), 1)[0]

@@ -3,34 +3,26 @@
 !> CASE.nml is a whole case file, its first material counts. STATES.bin: rows of xx, yy, zz, xy in
 !> Pa as float64, a multiple of no number in particular. RETURNED.bin: rows of xx, yy, zz, xy, gap.
 program return_driver
-  use, intrinsic :: iso_fortran_env, only: error_unit
+  use case_file, only: read_case
   use sg_config, only: config_t
-  use sg_errors, only: error_t
   use sg_kinds, only: wp
   use sg_materials, only: create_material, material_t, MODEL_MOHR_COULOMB, mohr_coulomb_strength
   use sg_particles, only: particles_t
-  use sg_posix, only: read_text
-  use sg_read_config, only: read_config
   use sg_stress_update, only: return_block
   use sg_weighting, only: BLOCK
   implicit none
 
   type(config_t) :: config
-  type(error_t), allocatable :: error
   type(material_t) :: material
   type(particles_t) :: points
-  character(len=512) :: case_file, states_file, returned_file
-  character(len=:), allocatable :: text
+  character(len=512) :: case_path, states_file, returned_file
   real(wp), allocatable :: states(:, :)
   integer :: unit, bytes, n, p
 
-  call get_command_argument(1, case_file)
+  call get_command_argument(1, case_path)
   call get_command_argument(2, states_file)
   call get_command_argument(3, returned_file)
-  call read_text(trim(case_file), text, error)
-  call stop_on_error()
-  call read_config(text, trim(case_file), config, error)
-  call stop_on_error()
+  call read_case(trim(case_path), config)
   material = create_material(config%materials(1))
   open (newunit=unit, file=trim(states_file), access='stream', form='unformatted', status='old')
   inquire (unit=unit, size=bytes)
@@ -56,12 +48,4 @@ program return_driver
     status='replace')
   write (unit) (points%sxx(p), points%syy(p), points%szz(p), points%sxy(p), points%gap(p), p=1, n)
   close (unit)
-
-contains
-
-  subroutine stop_on_error()
-    if (.not. allocated(error)) return
-    write (error_unit, '(a)') error%message
-    stop 2
-  end subroutine stop_on_error
 end program return_driver

@@ -95,6 +95,22 @@ class Result:
         return self.states[-1]
 
 
+def namelist_text(groups):
+    """What read_namelist has read, as text."""
+    return "".join(f"&{name} " + ", ".join(f"{k}={v}" for k, v in keys.items()) + " /\n" for name, keys in groups)
+
+
+def run_namelist(executable, namelist, directory, codes=(0,)):
+    """Runs a namelist in `directory`, whatever that held; any exit code but `codes` is an error."""
+    command = [executable, namelist, "--output", directory, "--overwrite"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode not in codes:
+        raise RuntimeError(
+            f"exit code {done.returncode}\n{done.stdout}{done.stderr}{Path(namelist).read_text()}"
+        )
+    return Result(directory)
+
+
 class Bench:
     """Runs cases of one directory with one executable; results are kept in a scratch directory."""
 
@@ -111,15 +127,6 @@ class Bench:
             if "file" in keys:
                 keys["file"] = as_text(str((self.inputs / keys["file"].strip("'")).resolve()))
         namelist = self.scratch / f"{case}_{self.count}.nml"
-        namelist.write_text(
-            "".join(
-                f"&{name} " + ", ".join(f"{k}={v}" for k, v in keys.items()) + " /\n" for name, keys in groups
-            )
-        )
+        namelist.write_text(namelist_text(groups))
         directory = self.scratch / f"{case}_{self.count}"
-        done = subprocess.run(
-            [self.executable, namelist, "--output", directory], capture_output=True, text=True, check=False
-        )
-        if done.returncode not in ((0, 4) if fails else (0,)):
-            raise RuntimeError(f"{case} {changes}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-        return Result(directory)
+        return run_namelist(self.executable, namelist, directory, (0, 4) if fails else (0,))

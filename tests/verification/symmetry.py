@@ -14,13 +14,12 @@ short time by far less than to the 1e-7 allowed. A mistake of a cell, a wall or 
 """
 
 import copy
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from runner import Result
+from runner import run_namelist
 
 ELASTIC_BOUND = 1e-10
 SAND_BOUND = 1e-7
@@ -176,12 +175,7 @@ def run(executable, directory, text):
     """Start, position, velocity and stress of the points at the end."""
     case = Path(directory) / "case.nml"
     case.write_text(text)
-    done = subprocess.run(
-        [executable, case, "--output", Path(directory) / "run", "--overwrite"], capture_output=True, text=True
-    )
-    if done.returncode != 0:
-        raise RuntimeError(f"{done.stdout}{done.stderr}{text}")
-    result = Result(Path(directory) / "run")
+    result = run_namelist(executable, case, Path(directory) / "run")
     last = result.last
     return (result.first.position, last.position, last.velocity, last.stress), int(result.row["steps"])
 
