@@ -1,7 +1,7 @@
 !> What several keys of a case must satisfy together. A check is made only where all keys it looks
 !> at have passed on their own, so that one mistake gives one fault.
 module sg_check_config
-  use sg_config, only: config_t
+  use sg_config, only: config_t, EDGE_TOLERANCE
   use sg_fault_list, only: did_you_mean, fault_list_t, quoted
   use sg_kinds, only: wp
   use sg_namelist, only: namelist_t
@@ -16,8 +16,6 @@ module sg_check_config
   !> How far a length may be from a whole number of cells, in cells a cell: rounding of a decimal
   !> number is 1e-16, a mistake is not below 1e-3.
   real(wp), parameter :: WHOLE_TOLERANCE = 1.0e-6_wp
-  !> A body may stick out of the grid by this share of a cell, for the same reason.
-  real(wp), parameter :: EDGE_TOLERANCE = 1.0e-6_wp
   !> More cells than this do not fit into memory: a misplaced decimal point.
   real(wp), parameter :: MOST_CELLS = 1.0e8_wp
 

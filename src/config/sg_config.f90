@@ -10,10 +10,13 @@ module sg_config
   public :: loading_config_t
   public :: solver_config_t, random_field_config_t, monte_carlo_config_t, study_config_t
   public :: output_config_t
-  public :: NAME_LENGTH
+  public :: NAME_LENGTH, EDGE_TOLERANCE
 
   !> Length of names and of words out of a fixed choice.
   integer, parameter :: NAME_LENGTH = 64
+  !> Share of a cell by which a place may miss the line it is meant to lie on: the rounding of a
+  !> decimal number is 1e-16, a mistake is not below 1e-3.
+  real(wp), parameter :: EDGE_TOLERANCE = 1.0e-6_wp
 
   type :: grid_config_t
     real(wp) :: x_min, x_max, y_min, y_max

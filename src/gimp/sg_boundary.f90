@@ -8,7 +8,7 @@
 !>
 !> Each condition keeps the impulse it gave (kg/s per metre) and all together the energy they took.
 module sg_boundary
-  use sg_config, only: boundary_config_t, grid_config_t
+  use sg_config, only: boundary_config_t, EDGE_TOLERANCE
   use sg_kinds, only: wp
   implicit none
   private
@@ -80,28 +80,31 @@ contains
   end function is_contact
 
   !> Prescribed velocity of the nodes in a box of the case file; `origin` is the place of node (0,
-  !> 0) in m. A node that is outside by less than 1e-6 of a cell counts as inside.
+  !> 0) in m. A node that is outside by less than EDGE_TOLERANCE of a cell counts as inside.
   pure function create_prescribed(config, origin, cell_size) result(condition)
     type(boundary_config_t), intent(in) :: config
     real(wp), intent(in) :: origin(2), cell_size
     type(condition_t) :: condition
-    real(wp), parameter :: SLACK = 1.0e-6_wp
 
     condition%is_prescribed = .true.
-    condition%box = [ceiling((config%x_min - origin(1))/cell_size - SLACK), &
-      floor((config%x_max - origin(1))/cell_size + SLACK), &
-      ceiling((config%y_min - origin(2))/cell_size - SLACK), &
-      floor((config%y_max - origin(2))/cell_size + SLACK)]
+    condition%box = [ceiling((config%x_min - origin(1))/cell_size - EDGE_TOLERANCE), &
+      floor((config%x_max - origin(1))/cell_size + EDGE_TOLERANCE), &
+      ceiling((config%y_min - origin(2))/cell_size - EDGE_TOLERANCE), &
+      floor((config%y_max - origin(2))/cell_size + EDGE_TOLERANCE)]
     condition%held = [config%components /= 'y', config%components /= 'x']
     condition%velocity = config%velocity
   end function create_prescribed
 
+  !> The nodes of `box` that lie in the window; both are i_first, i_last, j_first, j_last.
+  pure function overlap(box, window) result(nodes)
+    integer, intent(in) :: box(4), window(4)
+    integer :: nodes(4)
+    nodes = [max(box(1), window(1)), min(box(2), window(2)), max(box(3), window(3)), &
+      min(box(4), window(4))]
+  end function overlap
+
   !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
-  !> mass. `taken`: energy that the nodes lost to them in this step, J/m. In each constrained
-  !> component that is m/2 (old^2 - after^2) + m (free - old) after, free being the velocity without
-  !> any condition, after the one with all of them: forces work with the velocity
-  !> that strains the points, the constrained one, so a wall at rest takes the kinetic energy that
-  !> points carry into its nodes, and nothing else.
+  !> mass. `taken`: energy that the nodes lost to them in this step, J/m.
   pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
     type(condition_t), intent(inout) :: conditions(:)
     !> i_first, i_last, j_first, j_last.
@@ -111,14 +114,15 @@ contains
     !> Comes with zeros in total(4); the forces, total(5:6), are not kept.
     real(wp), intent(inout) :: total(8, 0:nx, 0:ny), motion(4, 0:nx, 0:ny)
     real(wp), intent(out) :: taken
-    real(wp) :: old(2), before(2), after(2)
-    integer :: c, i, j
+    real(wp) :: before(2), after(2)
+    integer :: c, i, j, nodes(4)
 
     do c = 1, size(conditions)
       associate (this => conditions(c))
         this%impulse = 0.0_wp
-        do j = max(this%box(3), window(3)), min(this%box(4), window(4))
-          do i = max(this%box(1), window(1)), min(this%box(2), window(2))
+        nodes = overlap(this%box, window)
+        do j = nodes(3), nodes(4)
+          do i = nodes(1), nodes(2)
             if (this%kind == KIND_CONTACT) this%touch(i, j) = TOUCH_NONE
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
@@ -133,22 +137,38 @@ contains
         end do
       end associate
     end do
+    call book_energy(conditions, window, nx, ny, total, motion, taken)
+  end subroutine apply_conditions
+
+  !> Energy that the nodes marked in total(4) lost to their conditions, each node once; takes the
+  !> marks away. In each constrained component that is m/2 (old^2 - after^2) + m (free - old) after,
+  !> free = total(5:6) being the velocity without any condition, after the one with all of them:
+  !> forces work with the velocity that strains the points, the constrained one, so a wall at rest
+  !> takes the kinetic energy that points carry into its nodes, and nothing else.
+  pure subroutine book_energy(conditions, window, nx, ny, total, motion, taken)
+    type(condition_t), intent(in) :: conditions(:)
+    integer, intent(in) :: window(4), nx, ny
+    real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
+    real(wp), intent(in) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(out) :: taken
+    real(wp) :: old(2), after(2)
+    integer :: c, i, j, nodes(4)
+
     taken = 0.0_wp
     do c = 1, size(conditions)
-      associate (box => conditions(c)%box)
-        do j = max(box(3), window(3)), min(box(4), window(4))
-          do i = max(box(1), window(1)), min(box(2), window(2))
-            if (.not. total(4, i, j) > 0.0_wp) cycle
-            total(4, i, j) = 0.0_wp
-            after = motion(3:4, i, j)
-            old = after - motion(1:2, i, j)
-            taken = taken + total(1, i, j)*sum(0.5_wp*(old**2 - after**2) + (total(5:6, i, j) &
-              - old)*after, mask=abs(after - total(5:6, i, j)) > 0.0_wp)
-          end do
+      nodes = overlap(conditions(c)%box, window)
+      do j = nodes(3), nodes(4)
+        do i = nodes(1), nodes(2)
+          if (.not. total(4, i, j) > 0.0_wp) cycle
+          total(4, i, j) = 0.0_wp
+          after = motion(3:4, i, j)
+          old = after - motion(1:2, i, j)
+          taken = taken + total(1, i, j)*sum(0.5_wp*(old**2 - after**2) + (total(5:6, i, j) &
+            - old)*after, mask=abs(after - total(5:6, i, j)) > 0.0_wp)
         end do
-      end associate
+      end do
     end do
-  end subroutine apply_conditions
+  end subroutine book_energy
 
   !> What a wall with contact did to a node; one of the TOUCH_ constants.
   pure function touch_of(this, before, after) result(touch)
@@ -186,18 +206,19 @@ contains
   end subroutine constrain
 
   !> The velocities motion(3:4) from which strains follow, without impulse: held components, and
-  !> those that a wall with contact held in the last momentum balance. (To cut
-  !> off the motion into the wall alone would make a mean motion out of it out of any noise.)
+  !> those that a wall with contact held in the last momentum balance. (To cut off the motion into
+  !> the wall alone would make a mean motion out of any noise.)
   pure subroutine hold_conditions(conditions, window, nx, ny, motion)
     type(condition_t), intent(in) :: conditions(:)
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
-    integer :: c, i, j
+    integer :: c, i, j, nodes(4)
 
     do c = 1, size(conditions)
       associate (this => conditions(c))
-        do j = max(this%box(3), window(3)), min(this%box(4), window(4))
-          do i = max(this%box(1), window(1)), min(this%box(2), window(2))
+        nodes = overlap(this%box, window)
+        do j = nodes(3), nodes(4)
+          do i = nodes(1), nodes(2)
             if (this%kind == KIND_CONTACT) then
               if (this%touch(i, j) /= TOUCH_NONE) motion(2 + this%normal, i, j) = 0.0_wp
               if (this%touch(i, j) == TOUCH_STICKS) motion(5 - this%normal, i, j) = 0.0_wp

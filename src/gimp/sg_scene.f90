@@ -2,7 +2,7 @@
 module sg_scene
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use sg_bodies, only: body_lattice_t, fill_body, is_inside
-  use sg_config, only: config_t
+  use sg_config, only: config_t, EDGE_TOLERANCE
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_initial_stress, only: set_geostatic_stress
   use sg_kinds, only: wp
@@ -38,9 +38,6 @@ module sg_scene
     procedure :: point_count
     procedure :: points_of
   end type scene_t
-
-  !> Share of a cell by which a length may exceed it: rounding of a decimal number.
-  real(wp), parameter :: EDGE_TOLERANCE = 1.0e-6_wp
 
 contains
 

@@ -289,7 +289,7 @@ contains
         call fail(STATUS_STEP_COLLAPSE, p, 'time step fell to '//to_text(clock%time_step, 4)//' s')
       else if (mod(clock%step, STEPS_PER_LEDGER) == 0 &
                .or. clock%time >= config%solver%end_time) then
-        created = energy_created(config, solver, clock)
+        created = energy_created(potential_energy(s, config%loading%gravity), solver, clock)
         if (created > MOST_CREATED) then
           p = maxloc(s%vx**2 + s%vy**2, dim=1)
           call fail(STATUS_ENERGY_CREATED, p, 'the scheme made energy from nothing, '// &
@@ -392,7 +392,7 @@ contains
       row%damping_work = solver%damping_work
       row%wall_work = solver%wall_work
       row%dissipated = row%plastic_work + row%damping_work + row%wall_work
-      row%energy_error = energy_imbalance(config, solver, clock)
+      row%energy_error = energy_imbalance(row%potential_energy, solver, clock)
       row%reaction = 0.0_wp
       if (clock%step > 0) row%reaction = solver%grid%reaction(clock%time_step)
       row%momentum = [sum(s%mass*s%vx), sum(s%mass*s%vy)]
@@ -409,44 +409,42 @@ contains
   !> and potential energy, and what stresses, damping and walls took, as a share of the largest of
   !> the potential energy released, the peak of kinetic energy, the elastic energy at the start and
   !> the work of forces.
-  function energy_imbalance(config, solver, clock) result(share)
-    type(config_t), intent(in) :: config
+  !> `potential` is the present potential energy, J/m.
+  pure function energy_imbalance(potential, solver, clock) result(share)
+    real(wp), intent(in) :: potential
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
-    real(wp) :: share, potential
+    real(wp) :: share
 
-    potential = potential_energy(solver%particles, config%loading%gravity)
     share = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
       + solver%wall_work - solver%force_work - clock%energy_at_start) &
-      /energy_scale(config, solver, clock)
+      /energy_scale(potential, solver, clock)
   end function energy_imbalance
 
   !> What errors of energy are measured by, J/m.
-  function energy_scale(config, solver, clock) result(scale)
-    type(config_t), intent(in) :: config
+  pure function energy_scale(potential, solver, clock) result(scale)
+    real(wp), intent(in) :: potential
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     real(wp) :: scale
 
-    scale = max(abs(clock%potential_at_start - potential_energy(solver%particles, &
-      config%loading%gravity)), clock%peak_energy, clock%elastic_at_start, &
-      abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
+    scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
+      clock%elastic_at_start, abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
   end function energy_scale
 
   !> Rise of the mechanical energy (kinetic, potential, elastic) above its first value and what
   !> prescribed velocities and body forces put in, as a share of the same scale: nothing passive can
   !> do that, whatever it loses on the way.
-  function energy_created(config, solver, clock) result(share)
-    type(config_t), intent(in) :: config
+  pure function energy_created(potential, solver, clock) result(share)
+    real(wp), intent(in) :: potential
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     real(wp) :: share, rise
 
-    rise = solver%tally%kinetic_energy + potential_energy(solver%particles, &
-      config%loading%gravity) - clock%energy_at_start + elastic_energy(solver%particles, &
-      solver%materials) - clock%elastic_at_start
+    rise = solver%tally%kinetic_energy + potential - clock%energy_at_start &
+      + elastic_energy(solver%particles, solver%materials) - clock%elastic_at_start
     share = (rise - max(-solver%wall_work, 0.0_wp) - max(solver%force_work, 0.0_wp)) &
-      /energy_scale(config, solver, clock)
+      /energy_scale(potential, solver, clock)
   end function energy_created
 
   !> The columns of a member that ended well.
@@ -483,7 +481,7 @@ contains
       touched = touched .or. (scene%extent(1) > g%x_min + cell .and. minval(s%x, &
         mask=s%is_measured()) < g%x_min + cell)
       v(WALL_TOUCHED) = merge(1.0_wp, 0.0_wp, touched)
-      v(ENERGY_ERROR) = energy_imbalance(config, solver, clock)
+      v(ENERGY_ERROR) = energy_imbalance(potential_energy(s, config%loading%gravity), solver, clock)
       v(MASS_ERROR) = sum(s%mass)/scene%mass - 1.0_wp
       angles = pack(s%friction_angle, s%is_measured() .and. ieee_is_finite(s%friction_angle))
       if (size(angles) > 0) then

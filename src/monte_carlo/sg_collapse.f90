@@ -10,7 +10,7 @@ module sg_collapse
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, outcome_t, reset_outcome, STATUS_ABANDONED, &
     STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, status_text, STEPS
-  use sg_posix, only: make_directory, write_file
+  use sg_posix, only: write_file
   use sg_resolved, only: resolved_text
   use sg_snapshot, only: snapshot_name
   use sg_philox, only: FIELD_STREAM, fill_uniform, NOISE_STREAM
@@ -122,8 +122,9 @@ contains
     end if
     if (this%is_recorded(id)) then
       associate (output => this%config%output)
-        call recorder%open(output%directory, trim(this%plan%cases(case_index)%label), id, &
-                           output%snapshot_interval, output%history_interval, error)
+        call recorder%open(output%directory, 'snapshots', &
+          trim(this%plan%cases(case_index)%label), id, output%snapshot_interval, &
+          output%history_interval, error)
       end associate
       if (allocated(error)) then
         call simulate(this%config, this%scene, variation, monitor, nobody, outcome)
@@ -163,7 +164,7 @@ contains
     label = trim(this%plan%cases(case_index)%label)
     associate (output => this%config%output)
       path = trim(output%directory)//'/failures/'//snapshot_name(label, id)
-      call recorder%open(output%directory, label, id, 0.0_wp, 0.0_wp, error, 'failures')
+      call recorder%open(output%directory, 'failures', label, id, 0.0_wp, 0.0_wp, error)
       if (.not. allocated(error)) then
         shortened = variation
         shortened%last_step = nint(outcome%values(FAILURE_STEP)) - 1

@@ -192,6 +192,10 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=*), parameter :: NAMES(5) = [character(len=16) :: 'resolved.nml', 'run.log', &
       'events.jsonl', 'STOP', ENSEMBLE_NAME]
+    !> Folder and ending of the files of members.
+    character(len=*), parameter :: MEMBER_FILES(2, 5) = reshape([character(len=12) :: &
+      '/snapshots', '.h5', '/snapshots', '.xdmf', '/failures', '.h5', '/failures', '.xdmf', &
+      '/failures', '.nml'], [2, 5])
     integer :: i
 
     call director%journal%clear(error)
@@ -199,11 +203,11 @@ contains
       if (allocated(error)) return
       call remove_file(director%directory//'/'//trim(NAMES(i)), error)
     end do
-    if (.not. allocated(error)) call remove_files(director%directory//'/snapshots', '.h5', error)
-    if (.not. allocated(error)) call remove_files(director%directory//'/snapshots', '.xdmf', error)
-    if (.not. allocated(error)) call remove_files(director%directory//'/failures', '.h5', error)
-    if (.not. allocated(error)) call remove_files(director%directory//'/failures', '.xdmf', error)
-    if (.not. allocated(error)) call remove_files(director%directory//'/failures', '.nml', error)
+    do i = 1, size(MEMBER_FILES, 2)
+      if (allocated(error)) return
+      call remove_files(director%directory//trim(MEMBER_FILES(1, i)), trim(MEMBER_FILES(2, i)), &
+        error)
+    end do
   end subroutine clear_directory
 
   !> An error that names the keys when the journal belongs to another run.

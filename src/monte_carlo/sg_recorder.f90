@@ -25,17 +25,15 @@ module sg_recorder
 
 contains
 
-  !> Begins the record of member `id` of the case `label` in the run directory. Intervals in s, 0
-  !> for none.
-  !> `folder`: of the run directory, where the file goes; snapshots if absent.
-  subroutine open_record(this, directory, label, id, snapshot_interval, history_interval, error, &
-    folder)
+  !> Begins the record of member `id` of the case `label` in a folder of the run directory.
+  !> Intervals in s, 0 for none.
+  subroutine open_record(this, directory, folder, label, id, snapshot_interval, &
+    history_interval, error)
     class(recorder_t), intent(inout) :: this
-    character(len=*), intent(in) :: directory, label
+    character(len=*), intent(in) :: directory, folder, label
     integer(i8), intent(in) :: id
     real(wp), intent(in) :: snapshot_interval, history_interval
     type(error_t), allocatable, intent(out) :: error
-    character(len=*), intent(in), optional :: folder
 
     this%wants_ends = .true.
     this%wants_plastic_strain = .true.
@@ -43,11 +41,7 @@ contains
     this%history_interval = history_interval
     allocate (this%rows(64))
     this%row_count = 0
-    if (present(folder)) then
-      call this%file%open(directory, folder, label, id, error)
-    else
-      call this%file%open(directory, 'snapshots', label, id, error)
-    end if
+    call this%file%open(directory, folder, label, id, error)
   end subroutine open_record
 
   subroutine note_history(this, row)

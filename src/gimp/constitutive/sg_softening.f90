@@ -13,7 +13,6 @@ module sg_softening
   use sg_kinds, only: wp
   use sg_materials, only: material_t, mohr_coulomb_strength
   use sg_mohr_coulomb, only: return_stress
-  use sg_weighting, only: BLOCK
   implicit none
   private
 
