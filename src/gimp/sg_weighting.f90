@@ -88,9 +88,9 @@ contains
     end do
   end subroutine gimp_axis_weights
 
-  !> The three weights and slopes of one point at `x` (m) whose domain is `w` cells wide; see the
-  !> head of the module. `half_inverse_width` = 1/(2w) and `slope` = 1/(w h) come from outside, where
-  !> they can be found once for many points.
+  !> The three weights and slopes of one point at `x` (m) whose domain is `w` cells wide; equations
+  !> are in the head of the module. `half_inverse_width` = 1/(2w) and `slope` = 1/(w h) come from
+  !> outside, where they can be found once for many points.
   pure subroutine domain_weights(x, w, half_inverse_width, slope, axis, base, s0, s1, s2, g0, g1, &
     g2)
     real(wp), intent(in) :: x, w, half_inverse_width, slope
