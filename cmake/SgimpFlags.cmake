@@ -11,6 +11,10 @@ if(SGIMP_ARCH STREQUAL "default")
   endif()
 elseif(SGIMP_ARCH)
   set(SGIMP_ARCH_FLAG -march=${SGIMP_ARCH})
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    # A node of the grid is eight numbers: one vector where the processor has such.
+    list(APPEND SGIMP_ARCH_FLAG -mprefer-vector-width=512)
+  endif()
 endif()
 
 set(SGIMP_FLAGS_ALWAYS "")

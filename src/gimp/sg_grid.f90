@@ -204,8 +204,10 @@ contains
           inverse_mass = 1.0_wp/mass
           vx = total(2, i, j)*inverse_mass
           vy = total(3, i, j)*inverse_mass
-          dvx = time_step*(total(5, i, j)*inverse_mass + gravity(1) - damping*vx)
-          dvy = time_step*(total(6, i, j)*inverse_mass + gravity(2) - damping*vy)
+          dvx = time_step*((total(5, i, j) + total(7, i, j))*inverse_mass + gravity(1) &
+            - damping*vx)
+          dvy = time_step*((total(6, i, j) + total(8, i, j))*inverse_mass + gravity(2) &
+            - damping*vy)
           motion(:, i, j) = [dvx, dvy, vx + dvx, vy + dvy]
           damping_work = damping_work + mass*(vx*(vx + 0.5_wp*dvx) + vy*(vy + 0.5_wp*dvy))
         else

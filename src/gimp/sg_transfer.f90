@@ -1,14 +1,19 @@
 !> Transfers between points and nodes, a block of points at a time.
 !>
 !> Node data are interleaved so that one node is one or two vectors:
-!>   nodes%total(1:8): mass, momentum x, momentum y, -, force x, force y, -, -   (sums over points)
-!>   nodes%motion(1:4): two velocities, whose meaning the time scheme chooses     (read by the
-!> points)
+!>   total(1:8)   mass, momentum x, momentum y, -, then the force in two parts, fx + fx', fy + fy':
+!>                fx, fy, fx', fy'                                         (sums over points)
+!>   motion(1:4)  two velocities, whose meaning the time scheme chooses    (read by the points)
 !>
-!> map_momentum:   m_i += S m_p;  p_i += S m_p v_p                            (Eqs. 3, 4 of Ma et
-!> al. 2022)
-!> map_force:      f_i -= V_p sigma_p grad S                                  (Eq. 5)
+!> map_momentum:   m_i += S m_p;  p_i += S m_p v_p                 (Eqs. 3, 4 of Ma et al. 2022)
+!> map_force:      f_i -= V_p sigma_p grad S                       (Eq. 5)
 !> gather:         a_p = sum S motion_i;  L_p = sum motion_i(3:4) (x) grad S
+!>
+!> With the force in two parts every component of total is one product (a function of x) (a function
+!> of y) (what the point brings), S S for 1 to 4, S' S for 5 and 6, S S' for 7 and 8, and a node
+!> costs one multiplication and addition of eight numbers. Since the weights of an axis add up to 1
+!> and their slopes to 0, a gather needs those of the outer nodes only:
+!>   sum S_k m_k = m_1 + S_0 (m_0 - m_1) + S_2 (m_2 - m_1)
 !>
 !> Nodes are counted along rows: node (i, j) is i + j (nx + 1). What a point brings to the nodes is
 !> laid out for the whole block first: vectors put together from numbers just computed would stall
@@ -22,6 +27,12 @@ module sg_transfer
   public :: map_momentum, map_force, map_momentum_and_force, map_body_force, gather_motion, &
     gather_motion_and_gradient
 
+  !> Which components of total go with the weight and which with the slope, along x and along y.
+  real(wp), parameter :: WITH_GX(8) = real([0, 0, 0, 0, 1, 1, 0, 0], wp)
+  real(wp), parameter :: WITH_GY(8) = real([0, 0, 0, 0, 0, 0, 1, 1], wp)
+  real(wp), parameter :: WITH_SX(8) = 1.0_wp - WITH_GX
+  real(wp), parameter :: WITH_SY(8) = 1.0_wp - WITH_GY
+
 contains
 
   !> Adds mass and momentum of `n` points to the nodes.
@@ -33,16 +44,22 @@ contains
     !> Last node in each direction.
     integer, intent(in) :: nx, ny
     real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp) :: a(4, BLOCK), along_row(4)
+    real(wp) :: brought(4, BLOCK), along_row(4)
     integer :: p, i, j, k, node
 
-    call pack_momentum(n, mass, vx, vy, a)
+    !$omp simd
+    do p = 1, n
+      brought(1, p) = mass(p)
+      brought(2, p) = mass(p)*vx(p)
+      brought(3, p) = mass(p)*vy(p)
+      brought(4, p) = 0.0_wp
+    end do
     do p = 1, n
       do j = 1, 3
         node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
         !$omp simd
         do k = 1, 4
-          along_row(k) = w%sy(p, j)*a(k, p)
+          along_row(k) = w%sy(p, j)*brought(k, p)
         end do
         do i = 1, 3
           !$omp simd
@@ -62,27 +79,11 @@ contains
     real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: nx, ny
     real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp) :: b(4, BLOCK), c(4, BLOCK), along_x(4), along_y(4)
-    integer :: p, i, j, k, node
+    real(wp) :: nothing(n)
 
-    call pack_force(n, volume, sxx, syy, sxy, b, c)
-    do p = 1, n
-      do j = 1, 3
-        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
-        !$omp simd
-        do k = 1, 4
-          along_x(k) = w%sy(p, j)*b(k, p)
-          along_y(k) = w%gy(p, j)*c(k, p)
-        end do
-        do i = 1, 3
-          !$omp simd
-          do k = 1, 4
-            total(4 + k, node + i) = total(4 + k, node + i) &
-              + (w%gx(p, i)*along_x(k) + w%sx(p, i)*along_y(k))
-          end do
-        end do
-      end do
-    end do
+    nothing = 0.0_wp
+    call map_momentum_and_force(n, w, nothing, nothing, nothing, volume, sxx, syy, sxy, nx, ny, &
+      total)
   end subroutine map_force
 
   !> map_momentum and map_force in one go through the nodes.
@@ -92,29 +93,27 @@ contains
     real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: nx, ny
     real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp) :: a(4, BLOCK), b(4, BLOCK), c(4, BLOCK), along_row(4), along_x(4), along_y(4)
+    real(wp) :: brought(8, BLOCK), along_row(8), along_column(8, 3)
     integer :: p, i, j, k, node
 
-    call pack_momentum(n, mass, vx, vy, a)
-    call pack_force(n, volume, sxx, syy, sxy, b, c)
+    call pack_points(n, mass, vx, vy, volume, sxx, syy, sxy, brought)
     do p = 1, n
+      do i = 1, 3
+        !$omp simd simdlen(8)
+        do k = 1, 8
+          along_column(k, i) = w%sx(p, i)*WITH_SX(k) + w%gx(p, i)*WITH_GX(k)
+        end do
+      end do
       do j = 1, 3
         node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
-        !$omp simd
-        do k = 1, 4
-          along_row(k) = w%sy(p, j)*a(k, p)
-          along_x(k) = w%sy(p, j)*b(k, p)
-          along_y(k) = w%gy(p, j)*c(k, p)
+        !$omp simd simdlen(8)
+        do k = 1, 8
+          along_row(k) = (w%sy(p, j)*WITH_SY(k) + w%gy(p, j)*WITH_GY(k))*brought(k, p)
         end do
         do i = 1, 3
-          !$omp simd
-          do k = 1, 4
-            total(k, node + i) = total(k, node + i) + w%sx(p, i)*along_row(k)
-          end do
-          !$omp simd
-          do k = 1, 4
-            total(4 + k, node + i) = total(4 + k, node + i) &
-              + (w%gx(p, i)*along_x(k) + w%sx(p, i)*along_y(k))
+          !$omp simd simdlen(8)
+          do k = 1, 8
+            total(k, node + i) = total(k, node + i) + along_column(k, i)*along_row(k)
           end do
         end do
       end do
@@ -141,41 +140,25 @@ contains
     end do
   end subroutine map_body_force
 
-  !> What S_x S_y multiplies in the first half of a node.
-  pure subroutine pack_momentum(n, mass, vx, vy, a)
+  !> What `n` points bring to their nodes, in the order of total(:).
+  pure subroutine pack_points(n, mass, vx, vy, volume, sxx, syy, sxy, brought)
     integer, intent(in) :: n
-    real(wp), intent(in) :: mass(n), vx(n), vy(n)
-    real(wp), intent(inout) :: a(4, BLOCK)
+    real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(inout) :: brought(8, BLOCK)
     integer :: p
 
     !$omp simd
     do p = 1, n
-      a(1, p) = mass(p)
-      a(2, p) = mass(p)*vx(p)
-      a(3, p) = mass(p)*vy(p)
-      a(4, p) = 0.0_wp
+      brought(1, p) = mass(p)
+      brought(2, p) = mass(p)*vx(p)
+      brought(3, p) = mass(p)*vy(p)
+      brought(4, p) = 0.0_wp
+      brought(5, p) = -volume(p)*sxx(p)
+      brought(6, p) = -volume(p)*sxy(p)
+      brought(7, p) = -volume(p)*sxy(p)
+      brought(8, p) = -volume(p)*syy(p)
     end do
-  end subroutine pack_momentum
-
-  !> What S_x' S_y (b) and S_x S_y' (c) multiply in the second half of a node.
-  pure subroutine pack_force(n, volume, sxx, syy, sxy, b, c)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
-    real(wp), intent(inout) :: b(4, BLOCK), c(4, BLOCK)
-    integer :: p
-
-    !$omp simd
-    do p = 1, n
-      b(1, p) = -volume(p)*sxx(p)
-      b(2, p) = -volume(p)*sxy(p)
-      b(3, p) = 0.0_wp
-      b(4, p) = 0.0_wp
-      c(1, p) = -volume(p)*sxy(p)
-      c(2, p) = -volume(p)*syy(p)
-      c(3, p) = 0.0_wp
-      c(4, p) = 0.0_wp
-    end do
-  end subroutine pack_force
+  end subroutine pack_points
 
   !> value(:, p) = sum of S times motion.
   pure subroutine gather_motion(n, w, nx, ny, motion, value)
@@ -209,27 +192,29 @@ contains
     integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(4, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(4, BLOCK), gradient(4, BLOCK)
-    real(wp) :: row, slope, v(4), gx(4), gy(4)
+    real(wp) :: before, after, row(4, 3), slope(4, 3), gx(4), gy(4)
     integer :: p, j, k, node
 
     do p = 1, n
-      v = 0.0_wp
-      gx = 0.0_wp
-      gy = 0.0_wp
       do j = 1, 3
         node = w%i(p) + (w%j(p) + j - 1)*(nx + 1)
-        !$omp simd private(row, slope)
+        !$omp simd private(before, after)
         do k = 1, 4
-          row = w%sx(p, 1)*motion(k, node) + w%sx(p, 2)*motion(k, node + 1) &
-            + w%sx(p, 3)*motion(k, node + 2)
-          slope = w%gx(p, 1)*motion(k, node) + w%gx(p, 2)*motion(k, node + 1) &
-            + w%gx(p, 3)*motion(k, node + 2)
-          v(k) = v(k) + w%sy(p, j)*row
-          gx(k) = gx(k) + w%sy(p, j)*slope
-          gy(k) = gy(k) + w%gy(p, j)*row
+          before = motion(k, node) - motion(k, node + 1)
+          after = motion(k, node + 2) - motion(k, node + 1)
+          row(k, j) = motion(k, node + 1) + w%sx(p, 1)*before + w%sx(p, 3)*after
+          slope(k, j) = w%gx(p, 1)*before + w%gx(p, 3)*after
         end do
       end do
-      value(:, p) = v
+      !$omp simd private(before, after)
+      do k = 1, 4
+        before = row(k, 1) - row(k, 2)
+        after = row(k, 3) - row(k, 2)
+        value(k, p) = row(k, 2) + w%sy(p, 1)*before + w%sy(p, 3)*after
+        gy(k) = w%gy(p, 1)*before + w%gy(p, 3)*after
+        gx(k) = slope(k, 2) + w%sy(p, 1)*(slope(k, 1) - slope(k, 2)) &
+          + w%sy(p, 3)*(slope(k, 3) - slope(k, 2))
+      end do
       gradient(1:2, p) = gx(3:4)
       gradient(3:4, p) = gy(3:4)
     end do
