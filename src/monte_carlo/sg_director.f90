@@ -55,7 +55,7 @@ module sg_director
 
 contains
 
-  !> A member that was just computed.
+  !> A member that was just computed: into the journal, whose sync `decide` waits for.
   subroutine accept(this, outcome)
     class(ensemble_director_t), intent(inout) :: this
     type(outcome_t), intent(in) :: outcome
@@ -95,6 +95,8 @@ contains
     real(wp) :: now, left
 
     decision = CARRY_ON
+    ! Once for all members that came in since the last look, and before anything is told of them.
+    if (.not. allocated(this%error)) call this%journal%sync(this%error)
     now = wall_seconds()
     if (allocated(this%error)) then
       this%stop_reason = this%error%message

@@ -1,5 +1,5 @@
-!> The real scheduler with members that sleep: how much of the ranks' time is idle, and how many
-!> members a second rank 0 can take in. Usage: mpirun -n N bench_scheduler [MEMBERS_PER_RANK]
+!> The real scheduler with members that sleep: how much of the ranks' time is idle, and what
+!> rank 0 spends on a member. Usage: mpirun -n N bench_scheduler [MEMBERS_PER_RANK]
 !> [SHORTEST]. Times of members are spread evenly from SHORTEST to 5 SHORTEST seconds. Sleeping
 !> members measure the scheduler, not the cores; ranks may outnumber these. The journal is written
 !> into the present directory. Prints; judges nothing.
@@ -16,7 +16,7 @@ program bench_scheduler
   use sleeping_members, only: counting_director_t, make_row, sleeping_model_t
   implicit none
 
-  integer, parameter :: QUICK_MEMBERS = 4000, MESSAGES = 1000
+  integer, parameter :: SYNCS = 200, MESSAGES = 1000
   type(comm_t) :: comm
   integer :: members_per_rank
   real(wp) :: shortest
@@ -25,7 +25,7 @@ program bench_scheduler
   shortest = argument(2, 0.02_wp)
   call comm%init()
   call time_idle()
-  call time_intake()
+  call time_journal()
   if (comm%size() > 1) call time_messages()
   call comm%finalize()
 
@@ -43,11 +43,16 @@ contains
     if (word /= '') read (word, *) value
   end function argument
 
+  subroutine give_up(error)
+    type(error_t), intent(in) :: error
+
+    print '(a)', error%message
+    call comm%abort(1)
+  end subroutine give_up
+
   !> Runs `number` members; `wall` from the first task to the last answer.
-  subroutine run_sleepers(number, shortest, with_journal, director, wall)
+  subroutine run_sleepers(number, director, wall)
     integer, intent(in) :: number
-    real(wp), intent(in) :: shortest
-    logical, intent(in) :: with_journal
     type(counting_director_t), intent(out) :: director
     real(wp), intent(out) :: wall
     type(sleeping_model_t) :: model
@@ -59,19 +64,16 @@ contains
     allocate (tasks(2, number))
     tasks(1, :) = 1
     tasks(2, :) = [(k, k=1_i8, int(number, i8))]
-    if (comm%rank() == 0 .and. with_journal) call director%keep_journal(error)
+    if (comm%rank() == 0) call director%keep_journal(error)
     call comm%agree(error)
-    if (allocated(error)) then
-      print '(a)', error%message
-      call comm%abort(1)
-    end if
+    if (allocated(error)) call give_up(error)
     call comm%barrier()
     wall = wall_seconds()
     call run_members(comm, tasks, director, model, 0.0_wp)
     wall = wall_seconds() - wall
     if (comm%rank() /= 0) return
     call director%journal%close()
-    if (with_journal) call remove_file(JOURNAL_NAME, error)
+    call remove_file(JOURNAL_NAME, error)
   end subroutine run_sleepers
 
   !> Share of the ranks' time in which no member was at work.
@@ -79,24 +81,47 @@ contains
     type(counting_director_t) :: director
     real(wp) :: wall
 
-    call run_sleepers(members_per_rank*comm%size(), shortest, .true., director, wall)
+    call run_sleepers(members_per_rank*comm%size(), director, wall)
     if (comm%rank() /= 0) return
     print '(i0, a, i0, a, f6.3, a, f6.3, a, f7.3, a)', comm%size(), ' ranks, ', director%count, &
       ' members of ', director%least, ' to ', director%most, ' s: wall ', wall, ' s'
     print '(a, f6.2, a)', 'idle share ', 100.0_wp*(1.0_wp - director%busy/(comm%size()*wall)), ' %'
   end subroutine time_idle
 
-  !> Members that take no time: how fast they go through rank 0, without and with the journal. On
-  !> several ranks the way to and fro limits, so this is the least that rank 0 can do.
-  subroutine time_intake()
+  !> What the journal costs rank 0: a row, and a sync, of one row and of many.
+  subroutine time_journal()
     type(counting_director_t) :: director
-    real(wp) :: wall(2)
+    type(outcome_t) :: outcome
+    type(error_t), allocatable :: error
+    real(wp) :: start, adding, syncing(2)
+    integer :: k
 
-    call run_sleepers(QUICK_MEMBERS, 0.0_wp, .false., director, wall(1))
-    call run_sleepers(QUICK_MEMBERS, 0.0_wp, .true., director, wall(2))
-    if (comm%rank() == 0) print '(a, f9.0, a, f9.0, a)', 'empty members per second: ', &
-      QUICK_MEMBERS/wall(1), ' without journal, ', QUICK_MEMBERS/wall(2), ' with it'
-  end subroutine time_intake
+    if (comm%rank() /= 0) return
+    call make_row(1, 1_i8, outcome)
+    call director%keep_journal(error)
+    if (allocated(error)) call give_up(error)
+    syncing = 0.0_wp
+    do k = 1, SYNCS
+      call director%accept(outcome)
+      start = wall_seconds()
+      call director%journal%sync(error)
+      if (allocated(error)) call give_up(error)
+      syncing(1) = syncing(1) + wall_seconds() - start
+    end do
+    adding = wall_seconds()
+    do k = 1, MESSAGES
+      call director%accept(outcome)
+    end do
+    adding = wall_seconds() - adding
+    start = wall_seconds()
+    call director%journal%sync(error)
+    syncing(2) = wall_seconds() - start
+    call director%journal%close()
+    call remove_file(JOURNAL_NAME, error)
+    print '(a, f7.2, a, f8.1, a, i0, a, f8.1, a)', 'journal: ', 1.0e6_wp*adding/MESSAGES, &
+      ' us a row, ', 1.0e6_wp*syncing(1)/SYNCS, ' us a sync of one row, of ', MESSAGES, &
+      ' rows ', 1.0e6_wp*syncing(2), ' us'
+  end subroutine time_journal
 
   !> What rank 0 does for one row that waits, but for keeping it: look, receive, unpack, and a new
   !> task.

@@ -110,6 +110,7 @@ contains
     integer :: decision
 
     decision = CARRY_ON
+    if (this%keeps .and. .not. allocated(this%error)) call this%journal%sync(this%error)
     if (allocated(this%error)) decision = STOP_NOW
   end function decide
 end module sleeping_members
