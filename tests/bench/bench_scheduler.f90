@@ -5,6 +5,7 @@
 !> into the present directory. Prints; judges nothing.
 program bench_scheduler
   use sg_comm, only: comm_t
+  use sg_ensemble, only: case_results_t, ENSEMBLE_NAME, run_record_t, write_ensemble
   use sg_errors, only: error_t
   use sg_journal, only: JOURNAL_NAME
   use sg_kinds, only: i1, i8, wp
@@ -13,10 +14,13 @@ program bench_scheduler
   use sg_posix, only: remove_file
   use sg_scheduler, only: run_members
   use sg_timer, only: wall_seconds
-  use sleeping_members, only: counting_director_t, make_row, sleeping_model_t
+  use sleeping_members, only: counting_director_t, make_row, PROFILE_COLUMNS, &
+    sleeping_model_t
   implicit none
 
   integer, parameter :: SYNCS = 200, MESSAGES = 1000
+  !> Rows of ensemble.h5: those of the paper's study.
+  integer, parameter :: CASES = 15, MEMBERS_PER_CASE = 1000
   type(comm_t) :: comm
   integer :: members_per_rank
   real(wp) :: shortest
@@ -26,6 +30,7 @@ program bench_scheduler
   call comm%init()
   call time_idle()
   call time_journal()
+  call time_ensemble()
   if (comm%size() > 1) call time_messages()
   call comm%finalize()
 
@@ -123,6 +128,51 @@ contains
       ' rows ', 1.0e6_wp*syncing(2), ' us'
   end subroutine time_journal
 
+  !> Writing ensemble.h5.
+  subroutine time_ensemble()
+    type(case_results_t) :: results(CASES)
+    type(run_record_t) :: record
+    type(outcome_t) :: outcome
+    type(error_t), allocatable :: error
+    real(wp) :: seconds
+    integer :: k, id
+
+    if (comm%rank() /= 0) return
+    do k = 1, CASES
+      results(k)%label = 'case_'//achar(iachar('a') + k)
+      results(k)%acf = 'snx'
+      results(k)%distribution = 'normal'
+      call results(k)%init(int(MEMBERS_PER_CASE, i8), PROFILE_COLUMNS)
+      do id = 1, MEMBERS_PER_CASE
+        call make_row(k, int(id, i8), outcome)
+        call results(k)%put(outcome)
+      end do
+    end do
+    call make_record(record)
+    seconds = wall_seconds()
+    call write_ensemble('.', record, results, error)
+    seconds = wall_seconds() - seconds
+    if (allocated(error)) call give_up(error)
+    call remove_file(ENSEMBLE_NAME, error)
+    print '(a, i0, a, f8.3, a)', ENSEMBLE_NAME//' of ', CASES*MEMBERS_PER_CASE, ' members: ', &
+      seconds, ' s'
+  end subroutine time_ensemble
+
+  subroutine make_record(record)
+    type(run_record_t), intent(out) :: record
+    integer :: i
+
+    record%case_text = '&case /'
+    record%resolved = '&case /'
+    record%host = ''
+    record%started = ''
+    record%ended = ''
+    record%state = 'bench'
+    record%config_hash = ''
+    record%field_method = ''
+    record%profile_x = [(0.125_wp*i, i=1, PROFILE_COLUMNS)]
+  end subroutine make_record
+
   !> What rank 0 does for one row that waits, but for keeping it: look, receive, unpack, and a new
   !> task.
   subroutine time_messages()
@@ -137,6 +187,8 @@ contains
     call make_row(1, 1_i8, outcome)
     bytes = pack_outcome(outcome)
     answer = 0
+    ! Rank 0 may still be in the scheduler, where these messages would be taken for its own.
+    call comm%barrier()
     if (comm%rank() == 1) then
       do k = 1, MESSAGES
         call comm%send(bytes, 0, ROW)

@@ -13,7 +13,7 @@ module sleeping_members
   implicit none
   private
 
-  public :: counting_director_t, make_row, sleeping_model_t
+  public :: counting_director_t, make_row, PROFILE_COLUMNS, sleeping_model_t
 
   !> Columns of the paper's profile.
   integer, parameter :: PROFILE_COLUMNS = 160
