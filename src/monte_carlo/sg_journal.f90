@@ -40,7 +40,7 @@ module sg_journal
     type(append_file_t) :: file
     character(len=:), allocatable :: path
     !> Records were added that may not be on disk yet.
-    logical :: is_dirty = .false.
+    logical :: has_unsynced = .false.
   contains
     procedure :: open
     procedure :: load
@@ -48,6 +48,7 @@ module sg_journal
     procedure :: clear
     procedure :: add
     procedure :: sync
+    procedure :: is_dirty
     procedure :: close
   end type journal_t
 
@@ -216,7 +217,7 @@ contains
     call this%file%append([transfer(SIGNATURE, shape_of), &
       transfer([FORMAT_VERSION, BYTE_ORDER, int(COLUMN_COUNT, i4), size(body, kind=i4), &
         checksum(body)], shape_of), body], error)
-    this%is_dirty = .true.
+    this%has_unsynced = .true.
     if (.not. allocated(error)) call this%sync(error)
   end subroutine start
 
@@ -240,7 +241,7 @@ contains
     body = [transfer(size(payload, kind=i4), shape_of), payload]
     call this%file%append([transfer(RECORD_MARK, shape_of), body(:4), &
       transfer(checksum(body), shape_of), payload], error)
-    this%is_dirty = .true.
+    this%has_unsynced = .true.
   end subroutine add
 
   !> Returns when all members added so far are on disk.
@@ -248,10 +249,18 @@ contains
     class(journal_t), intent(inout) :: this
     type(error_t), allocatable, intent(out) :: error
 
-    if (.not. this%is_dirty) return
+    if (.not. this%has_unsynced) return
     call this%file%sync(error)
-    this%is_dirty = allocated(error)
+    this%has_unsynced = allocated(error)
   end subroutine sync
+
+  !> Members were added that may not be on disk yet.
+  pure function is_dirty(this) result(dirty)
+    class(journal_t), intent(in) :: this
+    logical :: dirty
+
+    dirty = this%has_unsynced
+  end function is_dirty
 
   !> Gives up the lock.
   subroutine close (this)

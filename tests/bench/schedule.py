@@ -1,12 +1,13 @@
 """Replays recorded member times in simulated runs on many ranks, by the rule of src/monte_carlo/sg_scheduler.f90, and
 says how much of the ranks' time computes members and where the rest goes.
 
-Usage: schedule.py ENSEMBLE.h5 [--ranks 64 1024 16384] [--per-rank 1 10 100] [--message-us 20] [--sync-ms 0.3] ...
+Usage: schedule.py ENSEMBLE.h5|--spread SHORTEST [--ranks 64 1024 16384] [--per-rank 1 10 100] [--sync-ms 0.3] ...
 
 The rule: one pool in a fixed order; every rank computes, rank 0 too, which serves the others from inside its own
-members (every 5 ms, up to 1000 messages, then one sync of the journal); the others hold a task in advance until less
-than one task a rank is left. Costs of rank 0 are those that bench_scheduler and bench_startup print. Members are drawn
-with replacement from the recorded column `seconds`.
+members (every 5 ms, up to 1000 messages, then one sync of the journal unless that takes over 5 % of the time); the
+others hold a task in advance until less than one task a rank is left. Costs of rank 0 are those that bench_scheduler
+prints. Members are drawn with replacement from the recorded column `seconds`. With --spread 0.1 instead of a file they
+are those of bench_scheduler, which runs the real scheduler: the two should agree.
 """
 
 import argparse
@@ -19,6 +20,7 @@ import h5py
 import numpy as np
 
 LOOK_EVERY, REST, MESSAGES_PER_LOOK = 0.005, 0.0005, 1000
+SYNC_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class Run:
         self.results = []
         self.now = 0.0
         self.busy_serving = 0.0
+        self.last_sync, self.has_unsynced = 0.0, False
 
     def give(self, worker):
         """Fills up the tasks of a worker, as `give` of the scheduler does."""
@@ -82,8 +85,10 @@ class Run:
             self.start(worker, arrival - self.costs.latency)
             self.now += self.costs.message
             self.give(worker)
-        if self.now > begin:
+        self.has_unsynced = self.has_unsynced or self.now > begin
+        if self.has_unsynced and self.now - self.last_sync >= self.costs.sync / SYNC_SHARE:
             self.now += self.costs.sync
+            self.last_sync, self.has_unsynced = self.now, False
         if self.now >= self.next_write:
             self.now += self.costs.write
             self.next_write = self.now + self.costs.write_every
@@ -125,7 +130,8 @@ class Run:
 def arguments():
     """Parses the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("ensemble", type=Path)
+    parser.add_argument("ensemble", type=Path, nargs="?")
+    parser.add_argument("--spread", type=float, help="members of 1 to 5 times so many seconds")
     parser.add_argument("--ranks", type=int, nargs="+", default=[64, 1024, 16384])
     parser.add_argument("--per-rank", type=float, nargs="+", default=[1, 10, 100], help="members for each rank")
     parser.add_argument("--members", type=int, nargs="*", default=[], help="totals beside those")
@@ -135,7 +141,16 @@ def arguments():
     parser.add_argument("--startup-s", type=float, default=1.0)
     parser.add_argument("--write-s", type=float, default=0.1)
     parser.add_argument("--seed", type=int, default=1)
-    return parser.parse_args()
+    options = parser.parse_args()
+    if not options.ensemble and not options.spread:
+        parser.error("an ensemble.h5 or --spread")
+    return options
+
+
+def spread(shortest, number):
+    """Times of the members of tests/bench/sleeping_members.f90."""
+    share = np.arange(1, number + 1) * 0.618033988749895 % 1.0 * 4093.0 % 1.0
+    return shortest * (1.0 + 4.0 * share)
 
 
 def recorded(path):
@@ -147,7 +162,7 @@ def recorded(path):
 def main():
     """Prints a table."""
     options = arguments()
-    times = recorded(options.ensemble)
+    times = recorded(options.ensemble) if options.ensemble else spread(options.spread, 1000)
     costs = Costs(
         message=options.message_us * 1e-6,
         sync=options.sync_ms * 1e-3,
@@ -156,13 +171,15 @@ def main():
         write=options.write_s,
         write_every=max(30.0, options.write_s / 0.02),
     )
-    print(f"{len(times)} recorded members of {times.min():.2f} to {times.max():.2f} s, mean {times.mean():.2f} s")
+    print(f"{len(times)} members of {times.min():.2f} to {times.max():.2f} s, mean {times.mean():.2f} s")
     print(costs)
     print("| ranks | members | wall, s | efficiency | start-up | waiting for tasks | rank 0 serving | tail |")
     print("|---|---|---|---|---|---|---|---|")
     for ranks in options.ranks:
         for members in [*(round(ranks * n) for n in options.per_rank), *options.members]:
             drawn = np.random.default_rng(options.seed).choice(times, members)
+            if not options.ensemble:
+                drawn = spread(options.spread, members)
             share = Run(drawn, ranks, costs).simulate()
             parts = " | ".join(
                 f"{100 * share[name]:.2f} %" for name in ("efficiency", "start", "waiting", "rank 0", "tail")
