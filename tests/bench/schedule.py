@@ -13,7 +13,7 @@ are those of bench_scheduler, which runs the real scheduler: the two should agre
 import argparse
 import collections
 import heapq
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import h5py
@@ -25,10 +25,11 @@ SYNC_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Costs:
-    """In s. `message`: rank 0 takes in a row and gives a task; `sync`: of the journal; `latency`: of a message;
-    `startup`: before the first task; `write`: of ensemble.h5, every `write_every`."""
+    """In s. `message`: rank 0 takes in a row, gives a task and keeps the row; `task`: it gives a task; `sync`: of the
+    journal; `latency`: of a message; `startup`: before the first task; `write`: of ensemble.h5, every `write_every`."""
 
     message: float
+    task: float
     sync: float
     latency: float
     startup: float
@@ -99,7 +100,7 @@ class Run:
         self.next_write = self.costs.write_every
         for worker in range(1, self.ranks):
             self.give(worker)
-            self.now += 2 * self.costs.message
+            self.now += self.held[worker] * self.costs.task
         first = self.now
         while self.next < len(self.times):
             left = self.times[self.next]
@@ -136,6 +137,7 @@ def arguments():
     parser.add_argument("--per-rank", type=float, nargs="+", default=[1, 10, 100], help="members for each rank")
     parser.add_argument("--members", type=int, nargs="*", default=[], help="totals beside those")
     parser.add_argument("--message-us", type=float, default=20.0)
+    parser.add_argument("--task-us", type=float, default=2.0)
     parser.add_argument("--sync-ms", type=float, default=0.3)
     parser.add_argument("--latency-us", type=float, default=10.0)
     parser.add_argument("--startup-s", type=float, default=1.0)
@@ -165,6 +167,7 @@ def main():
     times = recorded(options.ensemble) if options.ensemble else spread(options.spread, 1000)
     costs = Costs(
         message=options.message_us * 1e-6,
+        task=options.task_us * 1e-6,
         sync=options.sync_ms * 1e-3,
         latency=options.latency_us * 1e-6,
         startup=options.startup_s,
@@ -172,7 +175,7 @@ def main():
         write_every=max(30.0, options.write_s / 0.02),
     )
     print(f"{len(times)} members of {times.min():.2f} to {times.max():.2f} s, mean {times.mean():.2f} s")
-    print(costs)
+    print(", ".join(f"{name} {value:.3g} s" for name, value in asdict(costs).items()))
     print("| ranks | members | wall, s | efficiency | start-up | waiting for tasks | rank 0 serving | tail |")
     print("|---|---|---|---|---|---|---|---|")
     for ranks in options.ranks:
