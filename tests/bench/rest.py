@@ -55,6 +55,7 @@ def run(options, scratch, settle):
     with h5py.File(scratch / name / "ensemble.h5") as file:
         cases = {label: {c: group[c][:] for c in COLUMNS} for label, group in file["cases"].items()}
     rows = {c: np.concatenate([case[c] for case in cases.values()]) for c in COLUMNS}
+    rows["case"] = np.repeat(list(cases), [len(case["status"]) for case in cases.values()])
     if (rows["status"] != 0).any():
         sys.exit(f"{np.count_nonzero(rows['status'])} members of {namelist} failed")
     return rows, cases["deterministic"]
@@ -77,13 +78,17 @@ def compare(settle, rows, long, cell):
         f"{rows['settle_time'][rested].mean():.2f} s on average; {rows['steps'].mean():.0f} steps each, "
         f"{100 * saved:.1f} % saved"
     )
-    print("| change after rest, in cells | mean | 99 % | largest |\n|---|---|---|---|")
+    print("| change after rest, in cells | mean | of a case, from | to | 99 % | largest |\n|---|---|---|---|---|---|")
     largest = {}
     for name in RUNOUTS:
         change = (long[name] - rows[name]) / cell
         largest[name] = np.abs(change).max()
         ninety_nine = np.quantile(np.abs(change), 0.99)
-        print(f"| `{name}` | {change.mean():+.3f} | {ninety_nine:.3f} | {largest[name]:.3f} |")
+        means = [change[rows["case"] == case].mean() for case in np.unique(rows["case"])]
+        print(
+            f"| `{name}` | {change.mean():+.3f} | {min(means):+.3f} | {max(means):+.3f} | {ninety_nine:.3f} "
+            f"| {largest[name]:.3f} |"
+        )
     if not rested.all():
         sys.exit("not all members came to rest: give a longer --end-time")
     return largest
