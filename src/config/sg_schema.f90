@@ -252,7 +252,7 @@ module sg_schema
     key_t('solver', 'end_time', KIND_REAL, unit='s', example='5', range='(0,)', required=.true., &
     meaning='Time at which a run ends, at the latest'), &
     key_t('solver', 'settle', KIND_REAL, unit='1', default='1e-4', range='[0,1)', &
-    meaning='End as soon as kinetic energy stays below this share of its peak; 0: never')]
+    meaning='End once kinetic energy stays under this share of its peak, front still; 0: never')]
 
   type(key_t), parameter :: RANDOM_FIELD_KEYS(*) = [ &
     key_t('random_field', 'property', KIND_WORD, default='friction_angle', &

@@ -15,7 +15,8 @@ module sg_posix
   public :: remove_file, remove_files
   public :: host_name, utc_time, working_directory, sleep_seconds, checksum, hash_text
 
-  !> A file to which bytes are added for good: `append` returns when they are on disk.
+  !> A file to which bytes are added: after `append` they outlive this process, after `sync` they
+  !> are on disk.
   type :: append_file_t
     private
     integer(c_int) :: descriptor = -1
@@ -24,6 +25,7 @@ module sg_posix
     procedure :: open => open_append_file
     procedure :: lock => lock_append_file
     procedure :: append => append_bytes
+    procedure :: sync => sync_append_file
     procedure :: truncate => truncate_append_file
     procedure :: close => close_append_file
   end type append_file_t
@@ -69,6 +71,13 @@ module sg_posix
       integer(c_int64_t), value :: length
       integer(c_int) :: status
     end function sg_append
+
+    function sg_sync(descriptor) bind(c) result(status)
+      import :: c_int
+      implicit none
+      integer(c_int), value :: descriptor
+      integer(c_int) :: status
+    end function sg_sync
 
     function sg_truncate(descriptor, length) bind(c) result(status)
       import :: c_int, c_int64_t
@@ -229,6 +238,15 @@ contains
       'cannot write '//this%path, 'append_bytes', EXIT_INTERNAL, error)
   end subroutine append_bytes
 
+  !> Returns when all bytes are on disk.
+  subroutine sync_append_file(this, error)
+    class(append_file_t), intent(in) :: this
+    type(error_t), allocatable, intent(out) :: error
+
+    call check(sg_sync(this%descriptor), 'cannot write '//this%path, 'sync_append_file', &
+      EXIT_INTERNAL, error)
+  end subroutine sync_append_file
+
   !> Cuts the file to `length` bytes.
   subroutine truncate_append_file(this, length, error)
     class(append_file_t), intent(in) :: this
@@ -244,7 +262,7 @@ contains
     integer(c_int) :: status
 
     if (this%descriptor < 0) return
-    ! Every byte was synced when it was appended: nothing can be lost here.
+    ! What has to be safe was synced before: nothing can be lost here.
     status = sg_close(this%descriptor)
     this%descriptor = -1
   end subroutine close_append_file

@@ -54,7 +54,7 @@ int sg_open_append(const char *path)
 
 int sg_close(int descriptor) { return close(descriptor) == 0 ? 0 : -errno; }
 
-/* Writes all bytes at the end of the file and waits until they are on disk. */
+/* Writes all bytes at the end of the file. */
 int sg_append(int descriptor, const char *bytes, int64_t length)
 {
   while (length > 0) {
@@ -67,8 +67,11 @@ int sg_append(int descriptor, const char *bytes, int64_t length)
     bytes += written;
     length -= written;
   }
-  return sync_descriptor(descriptor);
+  return 0;
 }
+
+/* Waits until all that was written is on disk. */
+int sg_sync(int descriptor) { return sync_descriptor(descriptor); }
 
 int sg_truncate(int descriptor, int64_t length)
 {

@@ -56,9 +56,13 @@ module sg_simulation
   !> has failed. What is stable creates 1 to 2 % at the most (tests/verification/conservation.py).
   integer, parameter :: STEPS_PER_LEDGER = 64
   real(wp), parameter :: MOST_CREATED = 0.1_wp
-  !> "Stays below": for one fundamental period of the body, 4 H/c, so that the turning points of an
-  !> elastic oscillation do not pass for rest.
-  real(wp), parameter :: SETTLE_PERIODS = 1.0_wp
+  !> "Stays below": for half a fundamental period of the body, 2 H/c, in which the kinetic energy of
+  !> an elastic oscillation goes through its whole cycle: turning points do not pass for rest.
+  real(wp), parameter :: SETTLE_PERIODS = 0.5_wp
+  !> Nor does a grain that slides on alone, too small to be seen in the kinetic energy: at rest the
+  !> farthest point advances slower than this share of the speed of a fall through half a cell.
+  !> Friction mu stops that within a 200th of a cell/mu.
+  real(wp), parameter :: STILL = 0.1_wp
   !> Share of the peak of kinetic energy at which a relaxation ends, at the least.
   real(wp), parameter :: RELAXED = 1.0e-6_wp
 
@@ -70,6 +74,8 @@ module sg_simulation
     real(wp) :: time = 0.0_wp, time_step = 0.0_wp
     real(wp) :: peak_energy = 0.0_wp, speed_limit = 0.0_wp
     real(wp) :: calm_since = 0.0_wp, calm_needed = 0.0_wp
+    !> Farthest point when the calm began, in m; the speed below which it counts as still, in m/s.
+    real(wp) :: calm_front = 0.0_wp, still_speed = 0.0_wp
     real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
     real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp, elastic_at_start = 0.0_wp
     logical :: settled = .false.
@@ -216,6 +222,8 @@ contains
     clock%peak_energy = solver%tally%kinetic_energy ! at the start both are the same
     clock%calm_needed = SETTLE_PERIODS*4.0_wp*max(scene%extent(2) - scene%extent(1), &
       scene%extent(4) - scene%extent(3))/scene%wave_speed
+    clock%calm_front = solver%tally%x_max
+    clock%still_speed = STILL*sqrt(norm2(config%loading%gravity)*config%grid%cell_size)
     fall = norm2(config%loading%gravity) &
       *(config%grid%x_max - config%grid%x_min + config%grid%y_max - config%grid%y_min)
     clock%speed_limit = RUNAWAY_FACTOR*(scene%wave_speed + scene%speed + sqrt(2.0_wp*fall))
@@ -315,18 +323,23 @@ contains
   end subroutine check_step
 
   !> At rest once the kinetic energy of the motion has stayed below its share of the peak for long
-  !> enough.
+  !> enough and the farthest point has stood still meanwhile.
   subroutine note_calm(config, solver, clock)
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
 
+    real(wp) :: calm
+    logical :: is_calm
+
     clock%peak_energy = max(clock%peak_energy, solver%tally%motion_energy)
-    if (solver%tally%motion_energy >= config%solver%settle*clock%peak_energy) then
-      clock%calm_since = clock%time
-    else
-      clock%settled = clock%time - clock%calm_since >= clock%calm_needed
-    end if
+    is_calm = solver%tally%motion_energy < config%solver%settle*clock%peak_energy
+    calm = clock%time - clock%calm_since
+    if (is_calm .and. calm < clock%calm_needed) return
+    clock%settled = is_calm .and. solver%tally%x_max - clock%calm_front <= clock%still_speed*calm
+    if (clock%settled) return
+    clock%calm_since = clock%time
+    clock%calm_front = solver%tally%x_max
   end subroutine note_calm
 
   subroutine ask_monitor(monitor, clock, outcome)

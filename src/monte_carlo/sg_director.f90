@@ -36,6 +36,7 @@ module sg_director
     type(error_t), allocatable :: error
     real(wp) :: last_report = 0.0_wp, last_write = 0.0_wp, last_look = 0.0_wp
     real(wp) :: write_cost = 0.0_wp, longest = 0.0_wp
+    real(wp) :: last_sync = 0.0_wp, sync_cost = 0.0_wp
   contains
     procedure :: accept
     procedure :: decide
@@ -43,19 +44,20 @@ module sg_director
     procedure :: report
     procedure :: running_text
     procedure :: write_results
+    procedure :: sync_journal
     procedure :: count_members
   end type ensemble_director_t
 
   !> Between two looks at the file STOP, in s.
   real(wp), parameter :: LOOK_EVERY = 1.0_wp
-  !> ensemble.h5 may take this share of the time.
-  real(wp), parameter :: WRITE_SHARE = 0.02_wp
+  !> ensemble.h5 and the sync of the journal may take these shares of the time.
+  real(wp), parameter :: WRITE_SHARE = 0.02_wp, SYNC_SHARE = 0.05_wp
   !> Kept free before the wall clock limit for the end of the run, in s.
   real(wp), parameter :: END_MARGIN = 1.0_wp
 
 contains
 
-  !> A member that was just computed.
+  !> A member that was just computed: into the journal, whose sync `decide` waits for.
   subroutine accept(this, outcome)
     class(ensemble_director_t), intent(inout) :: this
     type(outcome_t), intent(in) :: outcome
@@ -93,9 +95,11 @@ contains
     class(ensemble_director_t), intent(inout) :: this
     integer :: decision
     real(wp) :: now, left
+    type(error_t), allocatable :: error
 
     decision = CARRY_ON
     now = wall_seconds()
+    if (now - this%last_sync >= this%sync_cost/SYNC_SHARE) call this%sync_journal()
     if (allocated(this%error)) then
       this%stop_reason = this%error%message
       decision = STOP_NOW
@@ -118,7 +122,8 @@ contains
     end if
     if (now - this%last_report >= this%report_seconds) call this%report()
     if (now - this%last_write >= max(this%report_seconds, this%write_cost/WRITE_SHARE)) then
-      call this%write_results(this%error)
+      call this%write_results(error)
+      if (allocated(error)) call move_alloc(error, this%error)
     end if
   end function decide
 
@@ -127,6 +132,7 @@ contains
     class(ensemble_director_t), intent(inout) :: this
     integer(i8) :: done, failed
 
+    call this%sync_journal()
     call this%count_members(done, failed)
     this%last_report = wall_seconds()
     call this%progress%report(done, this%plan%total(), failed, this%fresh, &
@@ -161,11 +167,25 @@ contains
     end associate
   end function running_text
 
+  !> Puts on disk, at once, all members that came in since the last time. Nothing is told of a
+  !> member, in a line of progress or in ensemble.h5, before.
+  subroutine sync_journal(this)
+    class(ensemble_director_t), intent(inout) :: this
+    real(wp) :: begin
+
+    if (allocated(this%error) .or. .not. this%journal%is_dirty()) return
+    begin = wall_seconds()
+    call this%journal%sync(this%error)
+    this%last_sync = wall_seconds()
+    this%sync_cost = this%last_sync - begin
+  end subroutine sync_journal
+
   subroutine write_results(this, error)
     class(ensemble_director_t), intent(inout) :: this
     type(error_t), allocatable, intent(out) :: error
     real(wp) :: begin
 
+    call this%sync_journal()
     begin = wall_seconds()
     call write_ensemble(this%directory, this%record, this%results, error)
     this%last_write = wall_seconds()

@@ -1,6 +1,6 @@
 !> DIR/journal.bin: the truth on resume. A header with the configuration the directory belongs to,
-!> then one record for every finished member, appended and synced by rank 0. Its lock is that of the
-!> run directory.
+!> then one record for every finished member, appended by rank 0 and synced, many at once where many
+!> come at once. Its lock is that of the run directory.
 !>
 !> Header: 'SGIMPJNL', five int32 (version, byte order, columns, length of text, CRC of the text),
 !> text. Record: three int32 (mark, length of payload, CRC of length and payload), payload as in
@@ -39,12 +39,16 @@ module sg_journal
     private
     type(append_file_t) :: file
     character(len=:), allocatable :: path
+    !> Records were added that may not be on disk yet.
+    logical :: has_unsynced = .false.
   contains
     procedure :: open
     procedure :: load
     procedure :: start
     procedure :: clear
     procedure :: add
+    procedure :: sync
+    procedure :: is_dirty
     procedure :: close
   end type journal_t
 
@@ -213,6 +217,8 @@ contains
     call this%file%append([transfer(SIGNATURE, shape_of), &
       transfer([FORMAT_VERSION, BYTE_ORDER, int(COLUMN_COUNT, i4), size(body, kind=i4), &
         checksum(body)], shape_of), body], error)
+    this%has_unsynced = .true.
+    if (.not. allocated(error)) call this%sync(error)
   end subroutine start
 
   !> Makes it a new journal, without header.
@@ -223,7 +229,7 @@ contains
     call this%file%truncate(0_i8, error)
   end subroutine clear
 
-  !> Returns when the member is on disk.
+  !> The member outlives this process, and the machine once `sync` has returned.
   subroutine add(this, outcome, error)
     class(journal_t), intent(inout) :: this
     type(outcome_t), intent(in) :: outcome
@@ -235,7 +241,26 @@ contains
     body = [transfer(size(payload, kind=i4), shape_of), payload]
     call this%file%append([transfer(RECORD_MARK, shape_of), body(:4), &
       transfer(checksum(body), shape_of), payload], error)
+    this%has_unsynced = .true.
   end subroutine add
+
+  !> Returns when all members added so far are on disk.
+  subroutine sync(this, error)
+    class(journal_t), intent(inout) :: this
+    type(error_t), allocatable, intent(out) :: error
+
+    if (.not. this%has_unsynced) return
+    call this%file%sync(error)
+    this%has_unsynced = allocated(error)
+  end subroutine sync
+
+  !> Members were added that may not be on disk yet.
+  pure function is_dirty(this) result(dirty)
+    class(journal_t), intent(in) :: this
+    logical :: dirty
+
+    dirty = this%has_unsynced
+  end function is_dirty
 
   !> Gives up the lock.
   subroutine close (this)

@@ -43,7 +43,7 @@ module sg_scheduler
       type(outcome_t), intent(in) :: outcome
     end subroutine accept_interface
 
-    !> Called every few milliseconds.
+    !> Called every few milliseconds, and after members were accepted.
     function decide_interface(this) result(decision)
       import :: director_t
       implicit none
@@ -57,6 +57,8 @@ module sg_scheduler
   integer, parameter :: TASK_BYTES = 16
   !> Between two looks at messages while a member is computed, and while there is nothing to do.
   real(wp), parameter :: LOOK_EVERY = 0.005_wp, REST = 0.0005_wp
+  !> Rank 0 handles at most so many messages before it syncs and decides: some 10 ms of work.
+  integer, parameter :: MESSAGES_PER_LOOK = 1000
 
   !> What both kinds of rank share.
   type, abstract, extends(monitor_t) :: rank_monitor_t
@@ -219,7 +221,8 @@ contains
     logical :: found
     integer, parameter :: ORDERS(FINISH_STARTED:STOP_NOW) = [DRAIN, ABANDON_ALL]
 
-    do
+    ! Not without end: under a flood of results signals and the clock have their turn too.
+    do i = 1, MESSAGES_PER_LOOK
       call this%comm%probe(found, source, tag, length)
       if (.not. found) exit
       call this%handle(source, tag, length)

@@ -1,0 +1,119 @@
+!> What is done before the first step: once on each rank (scene, factors of the fields), and for
+!> each member (field, points, grid, first mapping), against the time of a member.
+!> Usage: bench_startup CASE.nml. Processor time; judges nothing.
+program bench_startup
+  use case_file, only: read_case, stop_on_error
+  use sg_collapse, only: collapse_model_t
+  use sg_config, only: config_t
+  use sg_errors, only: error_t
+  use sg_kinds, only: i8, wp
+  use sg_monitor, only: patient_monitor_t
+  use sg_observer, only: blind_observer_t
+  use sg_outcome, only: outcome_t, reset_outcome, STEPS
+  use sg_philox, only: FIELD_STREAM
+  use sg_plan, only: create_plan, plan_t
+  use sg_scene, only: build_scene, scene_t
+  use sg_simulation, only: simulate, variation_t
+  implicit none
+
+  integer, parameter :: REPEATS = 50
+  type(config_t) :: config
+  type(plan_t) :: plan
+  type(collapse_model_t) :: model
+  type(error_t), allocatable :: error
+  character(len=512) :: argument
+  real(wp) :: field, preparing, whole
+
+  call get_command_argument(1, argument)
+  call read_case(trim(argument), config)
+  if (.not. config%has_random_field) error stop 'a case with a random field is needed'
+  call create_plan(config, plan)
+  call time_once()
+  field = field_seconds()
+  preparing = member_seconds(0, REPEATS)
+  whole = member_seconds(huge(1), 1)
+  print '(a)', 'for each member:'
+  call say('  random field', field)
+  call say('  points, grid, first mapping, measures', preparing)
+  call say('  the whole member but its field', whole)
+  print '(a, f7.4, a)', 'share of a member before its first step: ', &
+    100.0_wp*(field + preparing)/(field + whole), ' %'
+
+contains
+
+  subroutine say(what, seconds)
+    character(len=*), intent(in) :: what
+    real(wp), intent(in) :: seconds
+
+    print '(a, t42, f12.4, a)', what, 1.0e3_wp*seconds, ' ms'
+  end subroutine say
+
+  !> Scene and factors.
+  subroutine time_once()
+    type(scene_t) :: scene
+    real(wp) :: started, scene_done, all_done
+
+    call cpu_time(started)
+    call build_scene(config, scene, error)
+    call stop_on_error(error)
+    call cpu_time(scene_done)
+    call model%init(config, plan, error)
+    call stop_on_error(error)
+    call cpu_time(all_done)
+    print '(a, i0, a, i0, a)', 'once on each rank, ', scene%particles%count, ' points, ', &
+      size(config%study%acf), ' autocorrelation functions:'
+    call say('  scene', scene_done - started)
+    call say('  factors of the fields', max(all_done - 2*scene_done + started, 0.0_wp))
+    print '(2x, a)', model%field_method()
+  end subroutine time_once
+
+  !> One random field.
+  function field_seconds() result(seconds)
+    real(wp) :: seconds
+    type(variation_t) :: variation
+    real(wp) :: started, clipped
+    integer :: k
+
+    call cpu_time(started)
+    do k = 1, REPEATS
+      call draw(int(k, i8), variation, clipped)
+    end do
+    call cpu_time(seconds)
+    seconds = (seconds - started)/REPEATS
+  end function field_seconds
+
+  subroutine draw(id, variation, clipped)
+    integer(i8), intent(in) :: id
+    type(variation_t), intent(out) :: variation
+    real(wp), intent(out) :: clipped
+
+    variation%material = config%random_field%material_index
+    allocate (variation%friction_angle(model%scene%point_count(variation%material)))
+    call model%fields(1)%realize(config%monte_carlo%seed, FIELD_STREAM, id, &
+      variation%friction_angle, clipped, error)
+    call stop_on_error(error)
+  end subroutine draw
+
+  !> A member that ends after `last_step`, without its field.
+  function member_seconds(last_step, repeats) result(seconds)
+    integer, intent(in) :: last_step, repeats
+    real(wp) :: seconds
+    type(variation_t) :: variation
+    type(patient_monitor_t) :: monitor
+    type(blind_observer_t) :: observer
+    type(outcome_t) :: outcome
+    real(wp) :: started, clipped
+    integer :: k
+
+    call draw(1_i8, variation, clipped)
+    variation%last_step = last_step
+    call cpu_time(started)
+    do k = 1, repeats
+      call reset_outcome(outcome, 2, 1_i8, size(model%scene%profile_x))
+      call simulate(config, model%scene, variation, monitor, observer, outcome)
+    end do
+    call cpu_time(seconds)
+    seconds = (seconds - started)/repeats
+    if (last_step > 0) print '(i0, a)', nint(outcome%values(STEPS)), ' steps to rest'
+  end function member_seconds
+end program bench_startup
