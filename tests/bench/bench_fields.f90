@@ -11,14 +11,29 @@ program bench_fields
   use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
   use sg_linear_algebra, only: multiply_from_left, multiply_from_right_transposed
+  use sg_marginal, only: marginal_t
   use sg_philox, only: FIELD_STREAM, fill_uniform, fill_words
   use sg_random_field, only: random_field_t
   use sg_sampler, only: estimate_sampler_memory
   use sg_scene, only: build_scene, scene_t
+  use sg_special_functions, only: normal_quantile
   use sg_white_noise, only: fill_white_noise
   implicit none
 
-  integer, parameter :: REPEATS = 5
+  integer, parameter :: REPEATS = 5, MEMBERS_AT_ONCE = 16
+  character(len=26), parameter :: PART_NAMES(8) = [character(len=26) :: 'random words', &
+    'uniform numbers', 'normal numbers by GSL', 'normal numbers', 'triangular products', &
+    'products, 16 members', 'normal marginal', 'lognormal marginal']
+
+  type :: parts_t
+    integer(i8), allocatable :: words(:)
+    !> Factor and noise of one member, noise of MEMBERS_AT_ONCE side by side and on top of one
+    !> another.
+    real(wp), allocatable :: factor(:, :), noise(:, :), wide(:, :), tall(:, :)
+    real(wp), allocatable :: z(:)
+    type(marginal_t) :: normal, lognormal
+  end type parts_t
+
   type(config_t) :: config
   type(scene_t) :: scene
   type(error_t), allocatable :: error
@@ -90,49 +105,78 @@ contains
       minval(seconds), ' most ', maxval(seconds), ' setup ', setup, ' bytes ', bytes
   end subroutine time_method
 
-  !> The steps of a Kronecker field, each by itself. Factors of ones do as well as any.
+  !> The steps of a Kronecker field, and other ways to do two of them, each by itself. Factors of
+  !> ones do as well as any.
   subroutine time_parts()
-    integer(i8), allocatable :: words(:)
-    real(wp), allocatable :: factor(:, :), noise(:, :)
-    type(random_field_t) :: field
-    real(wp) :: started, ended, seconds(5, REPEATS)
+    type(parts_t) :: parts
+    real(wp) :: started, ended, seconds(REPEATS)
     integer(i8) :: id
-    integer :: clipped, n, part, repeat
-    character(len=17), parameter :: NAMES(5) = ['random words     ', 'uniform numbers  ', &
-      'normal numbers   ', 'triangular       ', 'marginal         ']
+    integer :: part, repeat, members
 
-    n = nint(sqrt(real(size(x), wp)))
-    allocate (words(n*n), noise(n, n), factor(n, n))
-    factor = 1.0_wp/n
-    call field%set_cov(config%random_field, config%random_field%cov, error)
-    call stop_on_error(error)
-    do repeat = 1, REPEATS
-      do part = 1, size(NAMES)
+    call prepare_parts(parts)
+    do part = 1, size(PART_NAMES)
+      members = merge(MEMBERS_AT_ONCE, 1, part == 6)
+      do repeat = 1, REPEATS
         call cpu_time(started)
         do id = 1, fields
-          select case (part)
-          case (1)
-            call fill_words(1_i8, FIELD_STREAM, id, 0_i8, words)
-          case (2)
-            call fill_uniform(1_i8, FIELD_STREAM, id, 0_i8, values)
-          case (3)
-            call fill_white_noise(1_i8, FIELD_STREAM, id, noise)
-          case (4)
-            call multiply_from_left(factor, noise)
-            call multiply_from_right_transposed(factor, noise)
-            noise = noise + 1.0_wp
-          case (5)
-            call field%marginal%transform(noise(:, 1), values(:n), clipped)
-          end select
+          call do_part(part, id, parts)
         end do
         call cpu_time(ended)
-        seconds(part, repeat) = (ended - started)*1000/fields
-        if (part == 5) seconds(part, repeat) = seconds(part, repeat)*n
+        seconds(repeat) = (ended - started)*1000/fields/members
       end do
-    end do
-    do part = 1, size(NAMES)
-      print '(a, 2(a, f9.3))', 'part '//NAMES(part), ' least ', minval(seconds(part, :)), &
-        ' most ', maxval(seconds(part, :))
+      print '(a, 2(a, f9.3))', 'part '//PART_NAMES(part), ' least ', minval(seconds), ' most ', &
+        maxval(seconds)
     end do
   end subroutine time_parts
+
+  subroutine prepare_parts(parts)
+    type(parts_t), intent(out) :: parts
+    integer :: n
+
+    n = nint(sqrt(real(size(x), wp)))
+    allocate (parts%words(n*n), parts%factor(n, n), parts%noise(n, n), parts%z(n*n))
+    allocate (parts%wide(n, n*MEMBERS_AT_ONCE), parts%tall(n*MEMBERS_AT_ONCE, n))
+    parts%factor = 1.0_wp/n
+    parts%wide = 1.0_wp
+    parts%tall = 1.0_wp
+    associate (law => config%random_field)
+      call parts%normal%init('normal', law%mean, law%cov, law%lower, law%upper, error)
+      call stop_on_error(error)
+      call parts%lognormal%init('lognormal', law%mean, law%cov, law%lower, law%upper, error)
+      call stop_on_error(error)
+    end associate
+  end subroutine prepare_parts
+
+  subroutine do_part(part, id, parts)
+    !> Index into PART_NAMES.
+    integer, intent(in) :: part
+    integer(i8), intent(in) :: id
+    type(parts_t), intent(inout) :: parts
+    integer :: clipped, i
+
+    select case (part)
+    case (1)
+      call fill_words(1_i8, FIELD_STREAM, id, 0_i8, parts%words)
+    case (2)
+      call fill_uniform(1_i8, FIELD_STREAM, id, 0_i8, parts%z)
+    case (3)
+      call fill_uniform(1_i8, FIELD_STREAM, id, 0_i8, parts%z)
+      parts%z = [(normal_quantile(parts%z(i)), i=1, size(parts%z))]
+    case (4)
+      call fill_white_noise(1_i8, FIELD_STREAM, id, parts%noise)
+    case (5)
+      call multiply_from_left(parts%factor, parts%noise)
+      call multiply_from_right_transposed(parts%factor, parts%noise)
+      parts%noise = parts%noise + 1.0_wp
+    case (6)
+      call multiply_from_left(parts%factor, parts%wide)
+      parts%wide = parts%wide + 1.0_wp
+      call multiply_from_right_transposed(parts%factor, parts%tall)
+      parts%tall = parts%tall + 1.0_wp
+    case (7)
+      call parts%normal%transform(parts%z, values, clipped)
+    case default
+      call parts%lognormal%transform(parts%z, values, clipped)
+    end select
+  end subroutine do_part
 end program bench_fields
