@@ -1,8 +1,8 @@
 !> Independent standard normal numbers, each a function of its address.
 module sg_white_noise
   use sg_kinds, only: i8, wp
+  use sg_normal_quantile, only: to_normal
   use sg_philox, only: fill_uniform
-  use sg_special_functions, only: normal_quantile
   implicit none
   private
 
@@ -19,15 +19,19 @@ contains
     integer(i8), intent(in) :: realization
     !> [any, any].
     real(wp), contiguous, intent(out) :: values(:, :)
-    integer :: i, j
-    integer(i8) :: offset
 
-    do j = 1, size(values, 2)
-      offset = int(j - 1, i8)*size(values, 1)
-      call fill_uniform(seed, stream, realization, offset, values(:, j))
-      do i = 1, size(values, 1)
-        values(i, j) = normal_quantile(values(i, j))
-      end do
-    end do
+    call fill_in_order(seed, stream, realization, size(values), values)
   end subroutine fill_white_noise
+
+  !> The same for the elements in their order in memory, [n].
+  subroutine fill_in_order(seed, stream, realization, n, values)
+    integer(i8), intent(in) :: seed
+    integer, intent(in) :: stream
+    integer(i8), intent(in) :: realization
+    integer, intent(in) :: n
+    real(wp), intent(out) :: values(n)
+
+    call fill_uniform(seed, stream, realization, 0_i8, values)
+    call to_normal(values)
+  end subroutine fill_in_order
 end module sg_white_noise

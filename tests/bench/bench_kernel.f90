@@ -1,8 +1,7 @@
 !> Cost per point and step on the paper's column: whole runs of the three schemes, and where the
 !> time of usl goes.
-!> Usage: bench_kernel CASE.nml [end_time]. Prints processor time, which a busy machine spoils less
-!> than wall time;
-!> judges nothing.
+!> Usage: bench_kernel CASE.nml [end_time [scheme]]; with a scheme, the run of that one and no more.
+!> Prints processor time, which a busy machine spoils less than wall time; judges nothing.
 program bench_kernel
   use case_file, only: read_case, stop_on_error
   use sg_config, only: config_t
@@ -35,10 +34,15 @@ program bench_kernel
   call stop_on_error(error)
   print '(a, i0, a, f6.3, a)', 'points ', scene%particles%count, ', cells of ', &
     config%grid%cell_size, ' m'
-  do k = 1, size(SCHEMES)
-    call time_run(trim(SCHEMES(k)))
-  end do
-  call time_phases()
+  call get_command_argument(3, argument)
+  if (argument /= '') then
+    call time_run(trim(argument))
+  else
+    do k = 1, size(SCHEMES)
+      call time_run(trim(SCHEMES(k)))
+    end do
+    call time_phases()
+  end if
 
 contains
 
