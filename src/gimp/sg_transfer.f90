@@ -11,9 +11,7 @@
 !>
 !> With the force in two parts every component of total is one product (a function of x) (a function
 !> of y) (what the point brings), S S for 1 to 4, S' S for 5 and 6, S S' for 7 and 8, and a node
-!> costs one multiplication and addition of eight numbers. Since the weights of an axis add up to 1
-!> and their slopes to 0, a gather needs those of the outer nodes only:
-!>   sum S_k m_k = m_1 + S_0 (m_0 - m_1) + S_2 (m_2 - m_1)
+!> costs one multiplication and addition of eight numbers.
 !>
 !> Nodes are counted along rows: node (i, j) is i + j (nx + 1). What a point brings to the nodes is
 !> laid out for the whole block first: vectors put together from numbers just computed would stall
@@ -192,29 +190,27 @@ contains
     integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(4, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(4, BLOCK), gradient(4, BLOCK)
-    real(wp) :: before, after, row(4, 3), slope(4, 3), gx(4), gy(4)
+    real(wp) :: row, slope, v(4), gx(4), gy(4)
     integer :: p, j, k, node
 
     do p = 1, n
+      v = 0.0_wp
+      gx = 0.0_wp
+      gy = 0.0_wp
       do j = 1, 3
         node = w%i(p) + (w%j(p) + j - 1)*(nx + 1)
-        !$omp simd private(before, after)
+        !$omp simd private(row, slope)
         do k = 1, 4
-          before = motion(k, node) - motion(k, node + 1)
-          after = motion(k, node + 2) - motion(k, node + 1)
-          row(k, j) = motion(k, node + 1) + w%sx(p, 1)*before + w%sx(p, 3)*after
-          slope(k, j) = w%gx(p, 1)*before + w%gx(p, 3)*after
+          row = w%sx(p, 1)*motion(k, node) + w%sx(p, 2)*motion(k, node + 1) &
+            + w%sx(p, 3)*motion(k, node + 2)
+          slope = w%gx(p, 1)*motion(k, node) + w%gx(p, 2)*motion(k, node + 1) &
+            + w%gx(p, 3)*motion(k, node + 2)
+          v(k) = v(k) + w%sy(p, j)*row
+          gx(k) = gx(k) + w%sy(p, j)*slope
+          gy(k) = gy(k) + w%gy(p, j)*row
         end do
       end do
-      !$omp simd private(before, after)
-      do k = 1, 4
-        before = row(k, 1) - row(k, 2)
-        after = row(k, 3) - row(k, 2)
-        value(k, p) = row(k, 2) + w%sy(p, 1)*before + w%sy(p, 3)*after
-        gy(k) = w%gy(p, 1)*before + w%gy(p, 3)*after
-        gx(k) = slope(k, 2) + w%sy(p, 1)*(slope(k, 1) - slope(k, 2)) &
-          + w%sy(p, 3)*(slope(k, 3) - slope(k, 2))
-      end do
+      value(:, p) = v
       gradient(1:2, p) = gx(3:4)
       gradient(3:4, p) = gy(3:4)
     end do
