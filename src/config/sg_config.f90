@@ -133,11 +133,11 @@ module sg_config
     type(solver_config_t) :: solver
     !> False: no &random_field group, the run is deterministic and `random_field` holds nothing of
     !> meaning.
-    logical :: has_random_field
+    logical :: has_random_field = .false.
     type(random_field_config_t) :: random_field
     type(monte_carlo_config_t) :: monte_carlo
     !> False: no &study group, the heterogeneous case is called `base`.
-    logical :: has_study
+    logical :: has_study = .false.
     type(study_config_t) :: study
     type(output_config_t) :: output
   end type config_t

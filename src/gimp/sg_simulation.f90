@@ -328,7 +328,6 @@ contains
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
-
     real(wp) :: calm
     logical :: is_calm
 
