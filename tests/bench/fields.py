@@ -9,13 +9,13 @@ random waves, so within a field, given its waves, the correlation misses the one
 """
 
 import argparse
-import os
 import re
 import subprocess
 import time
 from pathlib import Path
 
 import numpy as np
+from launch import environment
 
 CASE = Path(__file__).resolve().parents[2] / "input" / "paper" / "study.nml"
 SCALE = 0.2  # m, of the case
@@ -30,8 +30,7 @@ def run_benchmark(options):
     """The lines of bench_fields."""
     program = options.build.resolve() / "tests" / "bench" / "bench_fields"
     command = [program, CASE, str(options.fields), str(options.dense)]
-    environment = dict(os.environ, OPENBLAS_NUM_THREADS="1")
-    return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout
+    return subprocess.run(command, check=True, capture_output=True, text=True, env=environment()).stdout
 
 
 def time_gstools():

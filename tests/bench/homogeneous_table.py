@@ -10,7 +10,6 @@ members: with secant steps on ln(damping), to 0.5 dm, half of the standard devia
 
 import argparse
 import math
-import os
 import re
 import subprocess
 import tempfile
@@ -18,6 +17,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from launch import environment, on_ranks
 
 TARGET = 6.003
 RUNOUTS = ("runout_max", "runout_connected", "runout_q995", "runout_q99")
@@ -35,11 +35,8 @@ def run(options, directory, scheme, cfl, damping):
     result = Path(directory) / f"{scheme}_{cfl}_{damping}"
     command = [options.executable, case, "--output", result, "--overwrite"]
     if options.ranks > 1:
-        command = ["mpirun", "--oversubscribe", "-n", str(options.ranks), *command]
-    environment = dict(os.environ)
-    if os.geteuid() == 0:
-        environment.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment)
+        command = on_ranks(options.ranks, command)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
     with h5py.File(result / "ensemble.h5") as file:
         group = file["cases/deterministic"]
         names = (*RUNOUTS, "height_wall", "seconds", "steps")

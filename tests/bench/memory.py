@@ -17,6 +17,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from launch import environment, on_ranks
+
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "gimp"
 STEPS = 5
 STEP_PER_CELL = 0.008  # s/m: CFL 0.4 at the wave speed of this sand, 49.85 m/s
@@ -82,11 +84,8 @@ def resident_megabytes(options, points, field, directory):
     )
     command = [options.sgimp, case]
     if options.ranks > 1:
-        command = ["mpirun", "--oversubscribe", "-n", str(options.ranks), *command]
-    environment = dict(os.environ, OPENBLAS_NUM_THREADS="1")
-    if os.geteuid() == 0:
-        environment.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment)
+        command = on_ranks(options.ranks, command)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment())
     # ru_maxrss, in KiB, is the largest of the process and of those it has waited for: under mpirun, the ranks.
     _, status, usage = os.wait4(process.pid, 0)
     if status != 0:

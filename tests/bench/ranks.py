@@ -8,7 +8,6 @@ x (time of a member alone) / (time of a member beside others).
 """
 
 import argparse
-import os
 import subprocess
 import tempfile
 import time
@@ -16,14 +15,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-
-ENVIRONMENT = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "OMPI_MCA_hwloc_base_binding_policy": "none",
-    "OPENBLAS_NUM_THREADS": "1",
-}
+from launch import environment, on_ranks
 
 
 def arguments():
@@ -39,10 +31,10 @@ def arguments():
 
 def run(options, ranks, directory):
     """Wall time of a run, from mpirun to its end, and the sum of its members' times, in s."""
-    command = [options.mpiexec, "-n", str(ranks), options.executable, options.case]
-    command += ["--output", directory, "--overwrite"]
+    command = [options.executable, options.case, "--output", directory, "--overwrite"]
+    command = on_ranks(ranks, command, options.mpiexec)
     start = time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ | ENVIRONMENT)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
     wall = time.perf_counter() - start
     with h5py.File(Path(directory) / "ensemble.h5") as file:
         members = np.concatenate([group["seconds"][:] for group in file["cases"].values()])
