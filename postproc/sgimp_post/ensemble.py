@@ -30,6 +30,7 @@ STATUS_TEXTS = {
     5: "runaway speed",
     6: "field failed",
     7: "energy created",
+    8: "extreme strain",
 }
 
 INTEGER_COLUMNS = ("settled", "wall_touched", "steps", "failure_step", "failure_point")

@@ -13,8 +13,9 @@ module sg_program
   use sg_plan, only: create_plan, plan_t
   use sg_posix, only: read_text
   use sg_read_config, only: read_config
-  use sg_replay, only: replay_member
+  use sg_replay, only: choose_member, replay_member
   use sg_resolved, only: compare_configs, resolved_text
+  use sg_text, only: to_text
   use sg_version, only: GIT_HASH, VERSION
   implicit none
   private
@@ -65,14 +66,20 @@ contains
     type(collapse_model_t) :: model
     type(run_request_t) :: request
     character(len=:), allocatable :: text
+    integer :: case_index
 
     exit_code = EXIT_OK
     call load_case(comm, options%case_file, text, config, error)
     if (allocated(error)) return
     if (options%output /= '') config%output%directory = options%output
     call create_plan(config, plan)
+    if (options%realization > 0) call choose_member(plan, options, case_index, error)
+    if (allocated(error)) return
     if (options%check) then
       if (comm%rank() == 0) call say_estimate(comm, config, plan, error)
+      if (options%realization > 0 .and. .not. allocated(error)) call say(comm, &
+        'realization     '//to_text(options%realization)//' of '// &
+        trim(plan%cases(case_index)%label)//' can be computed by itself')
       call comm%agree(error)
       return
     end if
@@ -80,8 +87,7 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     if (options%realization > 0) then
-      if (comm%rank() == 0) call replay_member(model, options, error)
-      call comm%agree(error)
+      if (comm%rank() == 0) call replay_member(model, options, case_index)
       return
     end if
     request%config = config

@@ -7,55 +7,55 @@ module sg_replay
   use sg_kinds, only: i8
   use sg_monitor, only: patient_monitor_t
   use sg_outcome, only: COLUMN_COUNT, COLUMNS, outcome_t, status_text
+  use sg_plan, only: plan_t
   use sg_snapshot, only: snapshot_name
   use sg_text, only: to_text
   implicit none
   private
 
-  public :: replay_member
+  public :: choose_member, replay_member
 
 contains
 
-  !> Computes the member that the options name and prints its row; with --snapshots its states are
-  !> written too.
-  subroutine replay_member(model, options, error)
+  !> Finds the member that the options name in the plan: the position of its case.
+  subroutine choose_member(plan, options, case_index, error)
+    type(plan_t), intent(in) :: plan
+    type(options_t), intent(in) :: options
+    integer, intent(out) :: case_index
+    type(error_t), allocatable, intent(out) :: error
+
+    if (options%study_case == '') then
+      case_index = size(plan%cases)
+      if (case_index > 2) call raise(error, EXIT_BAD_INPUT, &
+        '--realization of a study needs --study-case, one of: '//labels(plan), 'choose_member')
+    else
+      case_index = plan%find_case(options%study_case)
+      if (case_index == 0) call raise(error, EXIT_BAD_INPUT, 'no study case is called '// &
+        options%study_case//' (there are: '//labels(plan)//')', 'choose_member')
+    end if
+    if (allocated(error)) return
+    if (.not. plan%holds(case_index, int(options%realization, i8))) call raise(error, &
+      EXIT_BAD_INPUT, 'case '//trim(plan%cases(case_index)%label)//' has realizations 1 to '// &
+      to_text(plan%cases(case_index)%member_count), 'choose_member')
+  end subroutine choose_member
+
+  !> Computes the member that the options name, of the case `case_index`, and prints its row; with
+  !> --snapshots its states are written too.
+  subroutine replay_member(model, options, case_index)
     type(collapse_model_t), intent(inout) :: model
     type(options_t), intent(in) :: options
-    type(error_t), allocatable, intent(out) :: error
+    integer, intent(in) :: case_index
     type(patient_monitor_t) :: monitor
     type(outcome_t) :: outcome
-    character(len=:), allocatable :: label
     integer(i8) :: id
-    integer :: case_index, k
+    integer :: k
 
     id = int(options%realization, i8)
-    label = options%study_case
-    if (label == '') then
-      case_index = size(model%plan%cases)
-      if (case_index > 2) then
-        call raise(error, EXIT_BAD_INPUT, &
-          '--realization of a study needs --study-case, one of: '//labels(model), &
-                   'replay_member')
-        return
-      end if
-      label = trim(model%plan%cases(case_index)%label)
-    end if
-    case_index = model%plan%find_case(label)
-    if (case_index == 0) then
-      call raise(error, EXIT_BAD_INPUT, &
-        'no study case is called '//label//' (there are: '//labels(model)//')', &
-                 'replay_member')
-      return
-    end if
-    if (.not. model%plan%holds(case_index, id)) then
-      call raise(error, EXIT_BAD_INPUT, 'case '//label//' has realizations 1 to '// &
-                 to_text(model%plan%cases(case_index)%member_count), 'replay_member')
-      return
-    end if
     model%record_all = options%snapshots
     model%record_nothing = .not. options%snapshots
     call model%run(case_index, id, monitor, outcome)
-    write (output_unit, '(a)') snapshot_name(label, id)//': '//status_text(outcome%status)
+    write (output_unit, '(a)') snapshot_name( &
+      trim(model%plan%cases(case_index)%label), id)//': '//status_text(outcome%status)
     if (outcome%reason /= '') write (output_unit, '(a)') '  '//outcome%reason
     do k = 1, COLUMN_COUNT
       write (output_unit, '(2x, a24, 1x, a, 1x, a)') COLUMNS(k)%name, &
@@ -65,14 +65,14 @@ contains
       '(a)') '  written to '//model%config%output%directory//'/snapshots'
   end subroutine replay_member
 
-  function labels(model) result(text)
-    type(collapse_model_t), intent(in) :: model
+  pure function labels(plan) result(text)
+    type(plan_t), intent(in) :: plan
     character(len=:), allocatable :: text
     integer :: k
 
-    text = trim(model%plan%cases(1)%label)
-    do k = 2, size(model%plan%cases)
-      text = text//', '//trim(model%plan%cases(k)%label)
+    text = trim(plan%cases(1)%label)
+    do k = 2, size(plan%cases)
+      text = text//', '//trim(plan%cases(k)%label)
     end do
   end function labels
 end module sg_replay

@@ -8,7 +8,8 @@ module sg_outcome
   public :: outcome_t, column_t, COLUMNS, COLUMN_COUNT, reset_outcome
   public :: status_text
   public :: STATUS_OK, STATUS_NOT_FINITE, STATUS_POINT_LOST, STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT
-  public :: STATUS_RUNAWAY, STATUS_FIELD_FAILED, STATUS_ENERGY_CREATED, STATUS_ABANDONED
+  public :: STATUS_RUNAWAY, STATUS_FIELD_FAILED, STATUS_ENERGY_CREATED, STATUS_EXTREME_STRAIN
+  public :: STATUS_ABANDONED
   public :: RUNOUT_MAX, RUNOUT_Q99, RUNOUT_Q995, RUNOUT_CONNECTED, HEIGHT_MAX, HEIGHT_WALL
   public :: SETTLE_TIME, SETTLED, KINETIC_ENERGY_END, KINETIC_ENERGY_RATIO, WALL_TOUCHED
   public :: ENERGY_ERROR, MASS_ERROR
@@ -25,6 +26,7 @@ module sg_outcome
   integer, parameter :: STATUS_RUNAWAY = 5
   integer, parameter :: STATUS_FIELD_FAILED = 6
   integer, parameter :: STATUS_ENERGY_CREATED = 7
+  integer, parameter :: STATUS_EXTREME_STRAIN = 8
 
   !> Positions in `outcome_t%values`, in the order of COLUMNS.
   integer, parameter :: RUNOUT_MAX = 1, RUNOUT_Q99 = 2, RUNOUT_Q995 = 3, RUNOUT_CONNECTED = 4
@@ -124,6 +126,8 @@ contains
       text = 'field failed'
     case (STATUS_ENERGY_CREATED)
       text = 'energy created'
+    case (STATUS_EXTREME_STRAIN)
+      text = 'extreme strain'
     case default
       text = 'unknown'
     end select

@@ -11,8 +11,8 @@ module sg_simulation
     FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
     RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_ENERGY_CREATED, &
-    STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, STATUS_STEP_COLLAPSE, &
-    STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
+    STATUS_EXTREME_STRAIN, STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, &
+    STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle
@@ -37,8 +37,9 @@ module sg_simulation
     !> says.
     real(wp), allocatable :: friction_angle(:)
     integer :: material = 0
-    !> The run ends after so many steps (the last good state of one that failed).
-    integer :: last_step = huge(1)
+    !> The run ends after so many steps (the last good state of one that failed), or after so many
+    !> steps of the relaxation, which are then what the observer is shown.
+    integer :: last_step = huge(1), last_relaxation_step = huge(1)
   end type variation_t
 
   !> Steps between two questions to the monitor, in points moved: a few milliseconds of work.
@@ -52,10 +53,12 @@ module sg_simulation
   !> A speed this many times above all that the scene can explain (wave speed, fall through the
   !> domain, initial speed) counts as runaway.
   real(wp), parameter :: RUNAWAY_FACTOR = 10.0_wp
-  !> Steps between two looks at the ledger of energy, and the share of created energy at which a run
+  !> Steps between two looks at the ledger of energy, at the most, and the share of created energy at which a run
   !> has failed. What is stable creates 1 to 2 % at the most (tests/verification/conservation.py).
   integer, parameter :: STEPS_PER_LEDGER = 64
   real(wp), parameter :: MOST_CREATED = 0.1_wp
+  !> Volume of a point under stress, over that at its start, beyond which a run has failed.
+  real(wp), parameter :: LEAST_VOLUME = 0.05_wp, LARGEST_VOLUME = 1.0_wp/LEAST_VOLUME
   !> "Stays below": for half a fundamental period of the body, 2 H/c, in which the kinetic energy of
   !> an elastic oscillation goes through its whole cycle: turning points do not pass for rest.
   real(wp), parameter :: SETTLE_PERIODS = 0.5_wp
@@ -78,6 +81,11 @@ module sg_simulation
     real(wp) :: calm_front = 0.0_wp, still_speed = 0.0_wp
     real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
     real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp, elastic_at_start = 0.0_wp
+    !> Of the ledger, J/m: work of walls (taken) and body forces at the last look, what they gave
+    !> between looks, and the least mechanical energy so far less what they gave.
+    real(wp) :: seen_walls = 0.0_wp, seen_forces = 0.0_wp, given = 0.0_wp, least_energy = 0.0_wp
+    !> Kinetic energy above which the ledger is looked at at once, J/m.
+    real(wp) :: next_look = 0.0_wp
     logical :: settled = .false.
   end type clock_t
 
@@ -99,9 +107,9 @@ contains
 
     started = wall_seconds()
     call prepare(config, scene, variation, observer, solver)
-    if (config%loading%relaxation /= 'none') call relax(config, scene, variation, monitor, solver, &
-      outcome)
-    if (outcome%status /= STATUS_OK) then
+    if (config%loading%relaxation /= 'none') call relax(config, scene, variation, monitor, &
+      observer, solver, outcome)
+    if (outcome%status /= STATUS_OK .or. variation%last_relaxation_step < huge(1)) then
       outcome%values(STEPS) = 0.0_wp
       return
     end if
@@ -146,11 +154,12 @@ contains
   !> The quasi-static stage before time 0: gravity acts on the body under the damping that is
   !> critical for its slowest wave, 2 omega = pi c/H, held at its toe if it is gated. Ends at rest
   !> or after relaxation_time; then the gate is gone and the points have their first velocities.
-  subroutine relax(config, scene, variation, monitor, solver, outcome)
+  subroutine relax(config, scene, variation, monitor, observer, solver, outcome)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
     type(variation_t), intent(in) :: variation
     class(monitor_t), intent(inout) :: monitor
+    class(observer_t), intent(inout) :: observer
     type(solver_t), intent(inout) :: solver
     type(outcome_t), intent(inout) :: outcome
     type(config_t) :: stage
@@ -158,12 +167,13 @@ contains
     type(clock_t) :: clock
     type(blind_observer_t) :: nobody
     real(wp) :: vx(solver%particles%count), vy(solver%particles%count)
+    logical :: is_shown
 
     stage = config
     stage%solver%end_time = config%loading%relaxation_time
     stage%solver%settle = max(config%solver%settle, RELAXED)
     whole = variation
-    whole%last_step = huge(1)
+    whole%last_step = variation%last_relaxation_step
     vx = solver%particles%vx
     vy = solver%particles%vy
     solver%particles%vx = 0.0_wp
@@ -173,7 +183,10 @@ contains
     solver%damping = acos(-1.0_wp)*scene%wave_speed/(scene%extent(4) - scene%extent(3))
     if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe)
     call start_clock(stage, scene, solver, clock)
+    is_shown = observer%wants_ends .and. variation%last_relaxation_step < huge(1)
+    if (is_shown) call show_state(solver, observer, clock)
     call march(stage, scene, whole, monitor, nobody, solver, clock, outcome)
+    if (is_shown) call show_state(solver, observer, clock)
     if (outcome%status /= STATUS_OK) then
       if (outcome%status /= STATUS_ABANDONED) outcome%reason = 'before time 0, in the '// &
         'relaxation: '//outcome%reason
@@ -230,6 +243,7 @@ contains
     clock%potential_at_start = potential_energy(solver%particles, config%loading%gravity)
     clock%energy_at_start = solver%tally%kinetic_energy + clock%potential_at_start
     clock%elastic_at_start = elastic_energy(solver%particles, solver%materials)
+    clock%least_energy = mechanical_energy(clock%potential_at_start, solver)
   end subroutine start_clock
 
   !> CFL h/(c + v) with the present wave and point speeds, or the fixed step; never past the end.
@@ -260,9 +274,9 @@ contains
     type(scene_t), intent(in) :: scene
     type(variation_t), intent(in) :: variation
     type(solver_t), intent(in) :: solver
-    type(clock_t), intent(in) :: clock
+    type(clock_t), intent(inout) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: margin, x_first, x_last, y_first, y_last, created
+    real(wp) :: margin, x_first, x_last, y_first, y_last
     integer :: p
 
     margin = OUTSIDE_MARGIN*solver%grid%cell_size
@@ -295,19 +309,49 @@ contains
         .and. clock%time < config%solver%end_time) then
         p = maxloc(s%volume/s%mass, dim=1)
         call fail(STATUS_STEP_COLLAPSE, p, 'time step fell to '//to_text(clock%time_step, 4)//' s')
-      else if (mod(clock%step, STEPS_PER_LEDGER) == 0 &
+      else if (mod(clock%step, STEPS_PER_LEDGER) == 0 .or. t%kinetic_energy > clock%next_look &
                .or. clock%time >= config%solver%end_time) then
-        created = energy_created(potential_energy(s, config%loading%gravity), solver, clock)
-        if (created > MOST_CREATED) then
-          p = maxloc(s%vx**2 + s%vy**2, dim=1)
-          call fail(STATUS_ENERGY_CREATED, p, 'the scheme made energy from nothing, '// &
-            to_text(created, 3)//' of what was there: lower the cfl number, or use scheme = '// &
-            '''musl'' and weighting = ''gimp''; the point is the fastest one')
-        end if
+        call check_ledger()
+        if (outcome%status == STATUS_OK) call check_strain()
       end if
     end associate
 
   contains
+
+    !> Nothing passive can raise the mechanical energy above its least value so far by more than
+    !> walls and body forces gave. (What walls take is not counted on: they take kinetic energy of
+    !> the grid, the points may have lost less.)
+    subroutine check_ledger()
+      real(wp) :: potential, energy, created, scale
+
+      potential = potential_energy(solver%particles, config%loading%gravity)
+      clock%given = clock%given + max(clock%seen_walls - solver%wall_work, 0.0_wp) &
+        + max(solver%force_work - clock%seen_forces, 0.0_wp)
+      clock%seen_walls = solver%wall_work
+      clock%seen_forces = solver%force_work
+      energy = mechanical_energy(potential, solver) - clock%given
+      clock%least_energy = min(clock%least_energy, energy)
+      scale = energy_scale(potential, solver, clock)
+      created = (energy - clock%least_energy)/scale
+      clock%next_look = solver%tally%kinetic_energy + MOST_CREATED*scale
+      if (.not. created > MOST_CREATED) return
+      call fail(STATUS_ENERGY_CREATED, maxloc(solver%particles%vx**2 + solver%particles%vy**2, &
+        dim=1), 'the scheme made energy from nothing, '//to_text(created, 3)//' of what was '// &
+        'there: lower the cfl number, or use scheme = ''musl'' and weighting = ''gimp''; the '// &
+        'point is the fastest one')
+    end subroutine check_ledger
+
+    !> No material here means anything once a point that carries stress has lost or gained most of
+    !> its volume.
+    subroutine check_strain()
+      real(wp) :: ratio
+      integer :: point
+
+      call find_extreme_volume(solver, point, ratio)
+      if (ratio >= LEAST_VOLUME .and. ratio <= LARGEST_VOLUME) return
+      call fail(STATUS_EXTREME_STRAIN, point, 'volume under stress is '//to_text(ratio, 3)// &
+        ' of that at the start: the material is too soft for its load, or the scheme unstable')
+    end subroutine check_strain
 
     subroutine fail(status, point, reason)
       integer, intent(in) :: status, point
@@ -444,20 +488,38 @@ contains
       clock%elastic_at_start, abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
   end function energy_scale
 
-  !> Rise of the mechanical energy (kinetic, potential, elastic) above its first value and what
-  !> prescribed velocities and body forces put in, as a share of the same scale: nothing passive can
-  !> do that, whatever it loses on the way.
-  pure function energy_created(potential, solver, clock) result(share)
+  !> Kinetic, potential and elastic energy, J/m; `potential` is the present potential energy.
+  function mechanical_energy(potential, solver) result(energy)
     real(wp), intent(in) :: potential
     type(solver_t), intent(in) :: solver
-    type(clock_t), intent(in) :: clock
-    real(wp) :: share, rise
+    real(wp) :: energy
 
-    rise = solver%tally%kinetic_energy + potential - clock%energy_at_start &
-      + elastic_energy(solver%particles, solver%materials) - clock%elastic_at_start
-    share = (rise - max(-solver%wall_work, 0.0_wp) - max(solver%force_work, 0.0_wp)) &
-      /energy_scale(potential, solver, clock)
-  end function energy_created
+    energy = solver%tally%kinetic_energy + potential + elastic_energy(solver%particles, &
+      solver%materials)
+  end function mechanical_energy
+
+  !> The point under stress whose volume is farthest from that at its start, as their `ratio`.
+  pure subroutine find_extreme_volume(solver, point, ratio)
+    type(solver_t), intent(in) :: solver
+    integer, intent(out) :: point
+    real(wp), intent(out) :: ratio
+    real(wp) :: here
+    integer :: body, p
+
+    point = 1
+    ratio = 1.0_wp
+    associate (s => solver%particles)
+      do body = 1, size(s%bodies)
+        do p = s%bodies(body)%first, s%bodies(body)%last
+          if (s%gap(p) > 0.0_wp) cycle
+          here = solver%materials(s%bodies(body)%material)%density*s%volume(p)/s%mass(p)
+          if (max(here, 1.0_wp/here) <= max(ratio, 1.0_wp/ratio)) cycle
+          ratio = here
+          point = p
+        end do
+      end do
+    end associate
+  end subroutine find_extreme_volume
 
   !> The columns of a member that ended well.
   subroutine measure(config, scene, variation, solver, clock, outcome)

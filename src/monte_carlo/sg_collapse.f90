@@ -144,8 +144,8 @@ contains
   end subroutine run_collapse
 
   !> What a failed member leaves in DIR/failures: its first and its last good state (the step before
-  !> the failure, computed again), and a case file that replays it. A capsule that cannot be written
-  !> is told in the reason and hides nothing.
+  !> the failure, computed again; of the relaxation if it failed there), and a case file that
+  !> replays it. A capsule that cannot be written is told in the reason and hides nothing.
   subroutine keep_capsule(this, case_index, id, variation, monitor, outcome)
     class(collapse_model_t), intent(in) :: this
     integer, intent(in) :: case_index
@@ -159,15 +159,18 @@ contains
     type(error_t), allocatable :: error
     character(len=:), allocatable :: label, path
 
-    ! One that failed before its first step (in the relaxation) has no state but the scene's.
-    if (outcome%status == STATUS_TIME_LIMIT .or. .not. outcome%values(STEPS) > 0.0_wp) return
+    if (outcome%status == STATUS_TIME_LIMIT) return
     label = trim(this%plan%cases(case_index)%label)
     associate (output => this%config%output)
       path = trim(output%directory)//'/failures/'//snapshot_name(label, id)
       call recorder%open(output%directory, 'failures', label, id, 0.0_wp, 0.0_wp, error)
       if (.not. allocated(error)) then
         shortened = variation
-        shortened%last_step = nint(outcome%values(FAILURE_STEP)) - 1
+        if (outcome%values(STEPS) > 0.0_wp) then
+          shortened%last_step = nint(outcome%values(FAILURE_STEP)) - 1
+        else
+          shortened%last_relaxation_step = nint(outcome%values(FAILURE_STEP)) - 1
+        end if
         call reset_outcome(again, case_index, id, size(this%scene%profile_x))
         call simulate(this%config, this%scene, shortened, monitor, recorder, again)
         if (again%status == STATUS_ABANDONED) return

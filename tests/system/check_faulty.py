@@ -118,6 +118,22 @@ def check_listings(runner):
     check(code == 0, f"the case of --defaults is refused:\n{errors}")
 
 
+def check_member(runner):
+    """--check looks at --realization and --study-case too."""
+    case = ("small.nml", (FAULTY.parent / "small.nml").read_bytes())
+    for study_case, realization, expected, said in (
+        ("csx_cov0.10", "60", 0, "60 of csx_cov0.10"),
+        ("csx_cov0.10", "61", 2, "realizations 1 to 60"),
+        ("csx_cov0.1", "1", 2, "no study case is called csx_cov0.1"),
+        (None, "1", 2, "needs --study-case"),
+    ):
+        options = ["--check", "--realization", realization]
+        options += ["--study-case", study_case] if study_case else []
+        for ranks in (0, RANKS):
+            code, text, errors = runner.run(*options, case=case, ranks=ranks)
+            check(code == expected and said in text + errors, f"{options}: exit code {code}\n{text}{errors}")
+
+
 def main():
     """All of it."""
     parser = argparse.ArgumentParser()
@@ -127,6 +143,7 @@ def main():
     check_files(runner)
     check_no_case(runner)
     check_listings(runner)
+    check_member(runner)
 
 
 main()
