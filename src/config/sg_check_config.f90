@@ -396,6 +396,11 @@ contains
   subroutine check_solver(desk)
     type(desk_t), intent(inout) :: desk
 
+    if (desk%good('solver', 1, 'transfer weighting')) then
+      ! Their gradients jump between cells: bodies that meet fly apart (tests/verification).
+      if (desk%config%solver%transfer == 'tpic' .and. desk%config%solver%weighting == 'linear') &
+        call desk%fault('solver', 1, 'transfer', "'tpic' is not stable with weighting = 'linear'")
+    end if
     if (.not. desk%good('solver', 1, 'time_step end_time')) return
     associate (solver => desk%config%solver)
       if (solver%time_step > solver%end_time) call desk%fault('solver', 1, 'time_step', &

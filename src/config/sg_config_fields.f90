@@ -244,6 +244,7 @@ contains
     call visitor%begin_group('solver', 1)
     call visitor%visit('weighting', config%solver%weighting)
     call visitor%visit('scheme', config%solver%scheme)
+    call visitor%visit('transfer', config%solver%transfer)
     call visitor%visit('flip', config%solver%flip)
     call visitor%visit('anti_locking', config%solver%anti_locking)
     call visitor%visit('time_step', config%solver%time_step)

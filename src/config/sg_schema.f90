@@ -240,8 +240,11 @@ module sg_schema
     'uGIMP, in cpgimp its domain follows its stretch, bspline is quadratic'), &
     key_t('solver', 'scheme', KIND_WORD, default='musl', choices='usf usl musl', &
     meaning='When stress is updated: first, last, or last with momentum mapped anew'), &
-    key_t('solver', 'flip', KIND_REAL, unit='1', default='1', range='[0,1]', &
-    meaning='Share of FLIP in the velocity update; the rest is PIC'), &
+    key_t('solver', 'transfer', KIND_WORD, default='flip', choices='flip tpic', &
+    meaning='What points keep of their velocity: flip adds the change on the grid to it, tpic '// &
+    'takes that of the grid with its gradient'), &
+    key_t('solver', 'flip', KIND_REAL, unit='1', default='1', range='[0,1]', when='transfer', &
+    when_is='flip', meaning='Share of FLIP in the velocity update; the rest is PIC'), &
     key_t('solver', 'anti_locking', KIND_WORD, default='none', choices='none cell_average', &
     meaning='Volumetric strain of a point: its own, or the mean of its cell (nearly '// &
     'incompressible behaviour)'), &

@@ -40,6 +40,9 @@ module sg_particles
     real(wp), allocatable :: sin_friction(:), cohesion_term(:), tension_limit(:)
     !> Deformation gradient, [count]; size 0 where neither material nor weights need it.
     real(wp), allocatable :: fxx(:), fxy(:), fyx(:), fyy(:)
+    !> Gradient of the velocity, [4, count], in 1/s: d vx/dx, d vy/dx, d vx/dy, d vy/dy; size 0 but
+    !> for transfers that carry it.
+    real(wp), allocatable :: velocity_gradient(:, :)
     !> Friction angle as it was given, [count], in degrees; for output only.
     real(wp), allocatable :: friction_angle(:)
     !> Equivalent deviatoric plastic strain, [count]; size 0 where no material needs it and nobody
@@ -52,6 +55,7 @@ module sg_particles
     procedure :: has_deformation
     procedure :: track_plastic_strain
     procedure :: track_deformation
+    procedure :: carry_gradient
   end type particles_t
 
 contains
@@ -68,6 +72,7 @@ contains
     allocate (this%gap(count), this%sin_friction(count), this%cohesion_term(count))
     allocate (this%tension_limit(count), this%friction_angle(count))
     allocate (this%width(count), this%height(count))
+    allocate (this%velocity_gradient(4, 0))
     allocate (this%plastic_strain(0), this%fxx(0), this%fxy(0), this%fyx(0), this%fyy(0))
     this%x = 0.0_wp; this%y = 0.0_wp; this%vx = 0.0_wp; this%vy = 0.0_wp
     this%x_start = 0.0_wp; this%y_start = 0.0_wp; this%mass = 0.0_wp; this%volume = 0.0_wp
@@ -125,4 +130,13 @@ contains
     this%fyx = 0.0_wp
     this%fyy = 1.0_wp
   end subroutine track_deformation
+
+  !> Keeps the gradient of the velocity from now on, from 0.
+  subroutine carry_gradient(this)
+    class(particles_t), intent(inout) :: this
+
+    deallocate (this%velocity_gradient)
+    allocate (this%velocity_gradient(4, this%count))
+    this%velocity_gradient = 0.0_wp
+  end subroutine carry_gradient
 end module sg_particles

@@ -203,6 +203,7 @@ contains
     solver%particles%vx = vx
     solver%particles%vy = vy
     solver%particles%plastic_strain = 0.0_wp
+    solver%particles%velocity_gradient = 0.0_wp
     call solver%grid%clear()
     call solver%start()
   end subroutine relax

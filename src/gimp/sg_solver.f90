@@ -20,7 +20,7 @@ module sg_solver
   use sg_particles, only: body_points_t, particles_t
   use sg_stress_update, only: update_stress, wave_speed_squared
   use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_body_force, map_force, &
-    map_momentum, map_momentum_and_force
+    map_gradient, map_momentum, map_momentum_and_force
   use sg_weighting, only: axis_weights_interface, BLOCK, bspline_axis_weights, &
     cpgimp_axis_weights, gimp_axis_weights, linear_axis_weights, weights_t
   implicit none
@@ -49,6 +49,8 @@ module sg_solver
   type :: solver_t
     integer :: scheme
     procedure(axis_weights_interface), pointer, nopass :: axis_weights => null()
+    !> Points carry the gradient of their velocity to the nodes (TPIC, with flip = 0).
+    logical :: carries_gradient = .false.
     !> Share of FLIP (1 - share is PIC), gravity in m/s^2, damping in 1/s.
     real(wp) :: flip, gravity(2), damping
     !> The domains of the points follow their stretch (cpGIMP).
@@ -115,7 +117,9 @@ contains
     if (any(this%materials%softens)) call this%particles%track_plastic_strain()
     this%averages_cells = config%solver%anti_locking == 'cell_average'
     if (config%loading%body_force == 'manufactured') this%amplitude = config%loading%amplitude
-    this%flip = config%solver%flip
+    this%carries_gradient = config%solver%transfer == 'tpic'
+    if (this%carries_gradient) call this%particles%carry_gradient()
+    this%flip = merge(0.0_wp, config%solver%flip, this%carries_gradient)
     this%gravity = config%loading%gravity
     this%damping = config%loading%damping
   end subroutine configure
@@ -241,6 +245,7 @@ contains
     integer, intent(in) :: first, last
     type(weights_t) :: w
     real(wp) :: value(4, BLOCK), gradient(4, BLOCK), change(BLOCK)
+    logical :: keep_gradient
     integer :: n
 
     n = last - first + 1
@@ -251,7 +256,8 @@ contains
         return
       end if
       call this%find_weights(first, last, w)
-      if (sweep%update_stress .or. sweep%average_divergence) then
+      keep_gradient = this%carries_gradient .and. sweep%update_velocity
+      if (sweep%update_stress .or. sweep%average_divergence .or. keep_gradient) then
         call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &
           g%motion_store(g%motion_start), value, gradient)
       else if (sweep%update_velocity) then
@@ -262,6 +268,7 @@ contains
           gradient(1, :n) + gradient(4, :n))
         return
       end if
+      if (keep_gradient) p%velocity_gradient(:, first:last) = gradient(:, :n)
       if (sweep%update_velocity) then
         call update_velocity(n, this%flip, value, p%vx(first:last), p%vy(first:last))
       end if
@@ -297,6 +304,9 @@ contains
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
                        p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       end if
+      if (sweep%map_momentum .and. this%carries_gradient) call map_gradient(n, w, &
+        p%mass(first:last), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
+        g%x, g%y, g%total_store(g%total_start))
       if (sweep%map_force .and. this%amplitude > 0.0_wp) call this%push_points(time_step, &
         this%materials(body%material), first, last, w)
     end associate

@@ -6,6 +6,7 @@
 !>   motion(1:4)  two velocities, whose meaning the time scheme chooses    (read by the points)
 !>
 !> map_momentum:   m_i += S m_p;  p_i += S m_p v_p                 (Eqs. 3, 4 of Ma et al. 2022)
+!> map_gradient:   p_i += S m_p L_p (x_i - x_p)                    (TPIC, Nakamura et al. 2023)
 !> map_force:      f_i -= V_p sigma_p grad S                       (Eq. 5)
 !> gather:         a_p = sum S motion_i;  L_p = sum motion_i(3:4) (x) grad S
 !>
@@ -18,12 +19,12 @@
 !> the loads behind them.
 module sg_transfer
   use sg_kinds, only: wp
-  use sg_weighting, only: BLOCK, weights_t
+  use sg_weighting, only: axis_t, BLOCK, weights_t
   implicit none
   private
 
-  public :: map_momentum, map_force, map_momentum_and_force, map_body_force, gather_motion, &
-    gather_motion_and_gradient
+  public :: map_momentum, map_gradient, map_force, map_momentum_and_force, map_body_force, &
+    gather_motion, gather_motion_and_gradient
 
   !> Which components of total go with the weight and which with the slope, along x and along y.
   real(wp), parameter :: WITH_GX(8) = real([0, 0, 0, 0, 1, 1, 0, 0], wp)
@@ -68,6 +69,50 @@ contains
       end do
     end do
   end subroutine map_momentum
+
+  !> Adds to the momentum of the nodes what the velocities about `n` points differ from those at
+  !> them, L (x_i - x_p); no momentum in sum, since the weights reproduce linear functions.
+  pure subroutine map_gradient(n, w, mass, x, y, gradient, x_axis, y_axis, total)
+    integer, intent(in) :: n
+    type(weights_t), intent(in) :: w
+    !> [n], kg/m and m; [4, n], 1/s, in the order of gather_motion_and_gradient.
+    real(wp), intent(in) :: mass(n), x(n), y(n), gradient(4, n)
+    type(axis_t), intent(in) :: x_axis, y_axis
+    real(wp), intent(inout) :: total(8, 0:(x_axis%last + 1)*(y_axis%last + 1) - 1)
+    real(wp) :: dx(BLOCK, 3), dy(BLOCK, 3), at_point(2), along_x(2)
+    integer :: p, i, j, node
+
+    call find_distances(n, x, w%i, x_axis, dx)
+    call find_distances(n, y, w%j, y_axis, dy)
+    do p = 1, n
+      do j = 1, 3
+        node = w%i(p) + (w%j(p) + j - 1)*(x_axis%last + 1) - 1
+        at_point = w%sy(p, j)*mass(p)*dy(p, j)*gradient(3:4, p)
+        along_x = w%sy(p, j)*mass(p)*gradient(1:2, p)
+        do i = 1, 3
+          total(2:3, node + i) = total(2:3, node + i) + w%sx(p, i)*(at_point + dx(p, i)*along_x)
+        end do
+      end do
+    end do
+  end subroutine map_gradient
+
+  !> Distances from points to the three nodes of their stencils from `base` on, along one axis, m.
+  pure subroutine find_distances(n, x, base, axis, distance)
+    integer, intent(in) :: n, base(BLOCK)
+    real(wp), intent(in) :: x(n)
+    type(axis_t), intent(in) :: axis
+    real(wp), intent(inout) :: distance(BLOCK, 3)
+    real(wp) :: cell
+    integer :: p
+
+    cell = 1.0_wp/axis%inverse_cell
+    !$omp simd
+    do p = 1, n
+      distance(p, 1) = axis%origin + base(p)*cell - x(p)
+      distance(p, 2) = distance(p, 1) + cell
+      distance(p, 3) = distance(p, 2) + cell
+    end do
+  end subroutine find_distances
 
   !> Adds the internal force of `n` points to the nodes.
   pure subroutine map_force(n, w, volume, sxx, syy, sxy, nx, ny, total)

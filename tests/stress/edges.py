@@ -154,7 +154,7 @@ def sizes():
     yield variant("ten_points_a_cell", OK, body={"width": 1.0, "height": 1.0, "points_per_cell": 10})
     yield variant("disc_under_spacing", OK, body=disc(3.0, 1.0, 0.01))
     sliver = {"shape": "polygon", "vertices": (1.0, 1.0, 3.0, 1.001, 1.0, 1.002), "x": None, "y": None}
-    yield variant("sliver", (0, 2), body=sliver | {"width": None, "height": None})
+    yield variant("sliver", (0, 2, 4), body=sliver | {"width": None, "height": None})
 
 
 def disc(x, y, radius):

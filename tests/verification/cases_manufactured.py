@@ -9,6 +9,14 @@ CELLS = (8, 12, 16, 24)
 STEPS = 100
 # Demanded orders: second where no point leaves its cell, first where they do.
 SMALL, LARGE = 1.0e-4, 0.05
+METHODS = (
+    ("gimp", "flip"),
+    ("cpgimp", "flip"),
+    ("bspline", "flip"),
+    ("linear", "flip"),
+    ("gimp", "tpic"),
+    ("bspline", "tpic"),
+)
 DEMANDS = {SMALL: 1.8, LARGE: 1.0}
 
 
@@ -80,7 +88,7 @@ def manufactured(bench):
     yield at_most("body force against finite differences", 1e-5, error, "error of the differences")
     for amplitude, demand in DEMANDS.items():
         for scheme in ("usl", "musl", "usf"):
-            for weighting in ("gimp", "cpgimp", "bspline", "linear"):
+            for weighting, transfer in METHODS:
                 errors, seconds = [], 0.0
                 for cells in CELLS:
                     result = bench.run(
@@ -90,13 +98,15 @@ def manufactured(bench):
                             "loading.amplitude": amplitude,
                             "solver.weighting": weighting,
                             "solver.scheme": scheme,
+                            "solver.transfer": transfer,
                             "solver.time_step": END / round(STEPS * (cells / 8) ** 1.5),
                         },
                     )
                     errors.append(error_of(result, amplitude))
                     seconds += result.row["seconds"]
                 order = order_of(1 / np.array(CELLS), errors)
-                what = f"order, {scheme} {weighting}, G = {amplitude:g} m"
+                name = f"{scheme} {weighting}" + (f" {transfer}" if transfer != "flip" else "")
+                what = f"order, {name}, G = {amplitude:g} m"
                 cost = f"error {errors[-1]:.2g} G at {CELLS[-1]} cells, {seconds:.1f} s in all"
                 if weighting == "linear" and amplitude == LARGE:
                     yield note(what, order, f"points cross cells, linear weights do not converge; {cost}")

@@ -3,9 +3,9 @@
 Usage: granular.py --sgimp EXECUTABLE --inputs DIRECTORY --quick
        granular.py --sgimp EXECUTABLE --inputs DIRECTORY --runs DIRECTORY [--pictures DIRECTORY] PART ...
 `--quick` runs a small set in a scratch directory and judges it: exit code 1 if a demand is missed.
-Parts: shear, lube, grid, factors, kumar, refinement. Each prints Markdown tables and writes CSV files into the
-directory of --runs and, with `--pictures`, PNG files. A run is kept under the hash of its namelist; a second call
-goes on where the first was stopped, so remove the directory after a change of the program.
+Parts: shear, lube, grid, factors, kumar, kumar_factors, refinement. Each prints Markdown tables and writes CSV files
+into the directory of --runs and, with `--pictures`, PNG files. A run is kept under the hash of its namelist; a second
+call goes on where the first was stopped, so remove the directory after a change of the program.
 All lengths of columns are in units of the initial width. A value is mean +- standard deviation of the members,
 which differ in nothing physical.
 """
@@ -71,9 +71,7 @@ class Members:
             if name.startswith(("runout", "height")):
                 self.columns[name] = self.columns[name] / unit
         self.columns["visible"] = np.array([self.front(row, VISIBLE) for row in self.depth]) - 1.0
-        self.cpu = json.loads((directory / "cpu.json").read_text())["seconds"] / max(
-            1, self.count + self.failed
-        )
+        self.cpu = json.loads((directory / "cpu.json").read_text())["seconds"] / max(1, self.count + self.failed)
 
     def front(self, depth, least):
         """Right end of the last column of cells before the depth falls below `least`, from the left."""
@@ -258,9 +256,7 @@ def run_lube(store, options):
 
 def run_kumar(store, options):
     """Case 17."""
-    table = Table(
-        options.runs / "kumar.csv", "a", "reference", *HEAD, "connected - ref.", "visible - ref.", "height"
-    )
+    table = Table(options.runs / "kumar.csv", "a", "reference", *HEAD, "connected - ref.", "visible - ref.", "height")
     found = []
     for a in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0):
         members = column(store, "column_kumar", a, options.cells, kumar_runout, members=2 if a < 2.7 else 1)
@@ -303,14 +299,27 @@ def run_grid(store, options):
                 )
 
 
-# One factor changed at a time, from friction angle 35, 40 cells over the width, 2 x 2 points, musl, undamped.
+# Mohr-Coulomb whose dilation of 5 degrees is gone at a plastic strain of 0.1; strength stays.
+SHORT_DILATION = {
+    "material.dilation_angle": 5.0,
+    "material.softening": "linear",
+    "material.residual_cohesion": 0.0,
+    "material.softening_end": 1.0,
+    "material.dilation_end": 0.1,
+}
+
+# One factor changed at a time, from friction angle 35, 40 cells over the width, 2 x 2 points, musl, undamped. A whole
+# number is a number of cells.
 FACTORS = [
     ("nothing", {}),
     (f"friction angle {REPOSE} = repose", {"material.friction_angle": REPOSE}),
     (f"friction angle {ANGLE}: sin(phi) = tan(repose)", {"material.friction_angle": ANGLE}),
     ("friction angle 40", {"material.friction_angle": 40.0}),
     ("dilation angle 5", {"material.dilation_angle": 5.0}),
-    ("dilation angle 5, gone at plastic strain 0.1", "dilation_end"),
+    (
+        "dilation angle 5, gone at plastic strain 0.1",
+        {**SHORT_DILATION, "material.residual_friction_angle": 35.0},
+    ),
     ("cohesion 1 % of rho g width", {"material.cohesion": 0.01 * 1450 * 9.81 * WIDTH}),
     ("softer: E/(rho g width) = 37 as in the paper", {"material.young": 5.2e4}),
     ("stiffer: E/(rho g width) = 18300", {"material.young": 2.6e7}),
@@ -318,6 +327,7 @@ FACTORS = [
     ("at rest behind a gate first", {"loading.relaxation": "gated", "loading.relaxation_time": 1.0}),
     ("floor frictional, 0.7", {"grid.bottom": "frictional", "grid.bottom_friction": 0.7}),
     ("floor frictional, 0.5", {"grid.bottom": "frictional", "grid.bottom_friction": 0.5}),
+    ("10 cells", 10),
     ("20 cells", 20),
     ("80 cells", 80),
     ("1 x 1 points a cell", {"body.points_per_cell": 1}),
@@ -329,6 +339,7 @@ FACTORS = [
     ("flip share 0.99", {"solver.flip": 0.99}),
     ("weights cpgimp", {"solver.weighting": "cpgimp"}),
     ("weights bspline", {"solver.weighting": "bspline"}),
+    ("volumetric strain averaged over cells", {"solver.anti_locking": "cell_average"}),
     ("CFL 0.1", {"solver.cfl": 0.1}),
     ("CFL 0.8", {"solver.cfl": 0.8}),
     ("Drucker-Prager, plane strain", {"material.model": "drucker_prager"}),
@@ -337,48 +348,89 @@ FACTORS = [
 
 
 # Those that are also shown for a = 2.
-FACTORS_OF_TALL = [FACTORS[k][0] for k in (0, 1, 2, 3, 7, 8, 10, 13, 15, 18, 21, 23)]
+FACTORS_OF_TALL = [FACTORS[k][0] for k in (0, 1, 2, 3, 7, 8, 10, 13, 14, 19, 22, 24)]
+
+# The friction angle that Kumar's simple shear test (shear over normal stress = tan 22.2) stands for, read as ANGLE is.
+KUMAR_ANGLE = round(float(np.degrees(np.arcsin(np.tan(np.radians(22.2))))), 1)
+# His own GIMP runs: walls and floor of friction 0.466, 16 points a cell, columns in equilibrium before release.
+KUMAR_SETUP = {
+    **{f"grid.{side}": "frictional" for side in ("left", "bottom")},
+    **{f"grid.{side}_friction": 0.466 for side in ("left", "bottom")},
+    "body.points_per_cell": 4,
+    "loading.relaxation": "gated",
+    "loading.relaxation_time": 1.0,
+}
+
+
+def softening(peak, end):
+    """Linear softening from the friction angle `peak`, degrees, to 22.2 at the plastic strain `end`."""
+    return {
+        "material.friction_angle": peak,
+        "material.softening": "linear",
+        "material.residual_friction_angle": 22.2,
+        "material.residual_cohesion": 0.0,
+        "material.softening_end": end,
+    }
+
+
+def kumar_factors(a):
+    """One factor changed at a time from friction angle 22.2, 40 cells over the width, for the aspect ratio `a`."""
+    return [
+        ("nothing", {}),
+        (f"friction angle {KUMAR_ANGLE}: sin(phi) = tan(22.2)", {"material.friction_angle": KUMAR_ANGLE}),
+        ("friction angle 30", {"material.friction_angle": 30.0}),
+        ("a guess: friction 30, softening to 22.2 at plastic strain 0.1", softening(30.0, 0.1)),
+        ("a guess: friction 30, softening to 22.2 at plastic strain 1", softening(30.0, 1.0)),
+        (
+            "dilation angle 5, gone at plastic strain 0.1",
+            {**SHORT_DILATION, "material.residual_friction_angle": 22.2},
+        ),
+        ("floor frictional, 0.466", {"grid.bottom": "frictional", "grid.bottom_friction": 0.466}),
+        ("at rest behind a gate first", {"loading.relaxation": "gated", "loading.relaxation_time": 1.0}),
+        ("4 x 4 points a cell", {"body.points_per_cell": 4}),
+        ("the three above, and a frictional wall: Kumar's setup", KUMAR_SETUP),
+        ("front after 3 sqrt(H/g)", {"solver.end_time": round(3 * (a * WIDTH / 9.81) ** 0.5, 4)}),
+        ("softer: E/(rho g width) = 37", {"material.young": 7.0e4}),
+        ("10 cells", 10),
+        ("20 cells", 20),
+        ("flip share 0.999", {"solver.flip": 0.999}),
+        ("flip share 0.99", {"solver.flip": 0.99}),
+        ("volumetric strain averaged over cells", {"solver.anti_locking": "cell_average"}),
+        ("damping 1/s x sqrt(g/width)/10", {"loading.damping": 0.1 * (9.81 / WIDTH) ** 0.5}),
+    ]
+
+
+def vary(store, path, case, law, a, factors):
+    """Table of what moves the front of `case`.nml with aspect ratio `a`, one factor at a time from the first."""
+    print(f"\na = {a}, law {law(a):.3f}")
+    head = ("changed", *HEAD, "connected - law", "visible - base", "height", "energy lost")
+    table, base = Table(path, *head), None
+    for label, change in factors:
+        cells, keys = (change, {}) if isinstance(change, int) else (40, change)
+        members = column(store, case, a, cells, law, keys, 1 if cells > 40 or a > 1 else 2)
+        base = base or members
+        table.add(
+            label,
+            *(members.text(name) for name in RUNOUTS),
+            percent(members.mean("runout_connected"), law(a)),
+            percent(members.mean("visible"), base.mean("visible")),
+            f"{members.mean('height_wall'):.3f}",
+            f"{-100.0 * members.mean('energy_error'):.1f} %",
+        )
 
 
 def run_factors(store, options):
-    """What moves the front, one factor at a time."""
+    """What moves the front of case 16."""
     for a in (1.0, 2.0):
-        law, base = lube_runout(a), None
-        print(f"\na = {a}, law {law:.3f}")
-        table = Table(
-            options.runs / f"factors_{a}.csv",
-            "changed",
-            *HEAD,
-            "connected - law",
-            "visible - base",
-            "height",
-            "energy lost",
-        )
-        for label, change in FACTORS:
-            if a > 1 and label not in FACTORS_OF_TALL:
-                continue
-            cells, keys = (change, {}) if isinstance(change, int) else (40, change)
-            if change == "dilation_end":
-                keys = {
-                    "material.dilation_angle": 5.0,
-                    "material.softening": "linear",
-                    "material.residual_friction_angle": 35.0,
-                    "material.residual_cohesion": 0.0,
-                    "material.softening_end": 1.0,
-                    "material.dilation_end": 0.1,
-                }
-            members = column(
-                store, "column_lube", a, cells, lube_runout, keys, 1 if cells > 40 or a > 1 else 2
-            )
-            base = base or members
-            table.add(
-                label,
-                *(members.text(name) for name in RUNOUTS),
-                percent(members.mean("runout_connected"), law),
-                percent(members.mean("visible"), base.mean("visible")),
-                f"{members.mean('height_wall'):.3f}",
-                f"{-100.0 * members.mean('energy_error'):.1f} %",
-            )
+        factors = [pair for pair in FACTORS if a == 1.0 or pair[0] in FACTORS_OF_TALL]
+        vary(store, options.runs / f"factors_{a}.csv", "column_lube", lube_runout, a, factors)
+
+
+def run_kumar_factors(store, options):
+    """What moves the front of case 17."""
+    for a in (1.0, 2.0):
+        path = options.runs / f"kumar_factors_{a}.csv"
+        vary(store, path, "column_kumar", kumar_runout, a, kumar_factors(a))
 
 
 def refined(store, cell, points, cfl, members):
@@ -529,9 +581,7 @@ def draw_pareto(options, rows):
     for row in sorted(rows, key=lambda row: row[4].cpu):
         if row[3] > 0 and (not front or row[3] < front[-1][3]):
             front.append(row)
-    axes.plot(
-        [row[4].cpu for row in front], [100 * row[3] for row in front], "k--", lw=0.8, label="Pareto front"
-    )
+    axes.plot([row[4].cpu for row in front], [100 * row[3] for row in front], "k--", lw=0.8, label="Pareto front")
     axes.set(xscale="log", yscale="log", xlabel="processor time a member, s", ylabel="misplaced mass, %")
     axes.legend(frameon=False, fontsize=8)
     save(options, figure, "granular_pareto.png")
@@ -543,6 +593,7 @@ PARTS = {
     "grid": run_grid,
     "factors": run_factors,
     "kumar": run_kumar,
+    "kumar_factors": run_kumar_factors,
     "refinement": run_refinement,
 }
 
@@ -578,9 +629,7 @@ def main():
     parser.add_argument("--inputs", type=Path, required=True, help="directory of the namelists")
     parser.add_argument("--runs", type=Path, help="where runs are kept")
     parser.add_argument("--pictures", type=Path, help="where pictures go")
-    parser.add_argument(
-        "--cells", type=int, default=40, help="cells over the width of a column (lube, kumar)"
-    )
+    parser.add_argument("--cells", type=int, default=40, help="cells over the width of a column (lube, kumar)")
     parser.add_argument("--quick", action="store_true", help="judge a small set")
     parser.add_argument("part", nargs="*", choices=[*PARTS, []], help="sweeps to run")
     options = parser.parse_args()

@@ -27,7 +27,12 @@ SIDES = ("left", "right", "bottom", "top")
 # Each scheme once, each smooth weighting function once. Not USL with domains (GIMP): a domain that reaches a
 # node by no matter how little, u, takes a finite strain from it at once (force over mass as 1/u, slope as u),
 # so that roundings decide; MUSL and USF take strains from velocities that know nothing of that force.
-SOLVERS = (("musl", "cpgimp"), ("usf", "gimp"), ("usl", "bspline"))
+SOLVERS = (
+    ("musl", "cpgimp", "flip"),
+    ("usf", "gimp", "flip"),
+    ("usl", "bspline", "flip"),
+    ("musl", "gimp", "tpic"),
+)
 # All four walls differ; the body touches none and is nowhere in the middle.
 BLOCK = {
     "low": [-1.0, -0.5],
@@ -63,7 +68,7 @@ SAND = {
 }
 
 
-def write(scene, scheme, weighting):
+def write(scene, scheme, weighting, transfer):
     """The scene as a namelist."""
     walls = ", ".join(f"{side}='{scene['walls'][side][0]}'" for side in SIDES)
     walls += "".join(f", {s}_friction={w[1]}" for s, w in scene["walls"].items() if w[0] == "frictional")
