@@ -86,9 +86,10 @@ def manufactured(bench):
     exact = closed_form(start, 0.004, LARGE)
     error = np.abs(force(start, 0.004, LARGE) - exact).max() / np.abs(exact).max()
     yield at_most("body force against finite differences", 1e-5, error, "error of the differences")
-    for amplitude, demand in DEMANDS.items():
+    for amplitude in DEMANDS:
         for scheme in ("usl", "musl", "usf"):
             for weighting, transfer in METHODS:
+                demand = DEMANDS[amplitude]
                 errors, seconds = [], 0.0
                 for cells in CELLS:
                     result = bench.run(
@@ -111,4 +112,8 @@ def manufactured(bench):
                 if weighting == "linear" and amplitude == LARGE:
                     yield note(what, order, f"points cross cells, linear weights do not converge; {cost}")
                 else:
-                    yield at_least(what, demand, order, f"theory: 2, with cell crossing 1; {cost}")
+                    theory = "theory: 2, with cell crossing 1"
+                    if scheme == "usf" and transfer == "tpic" and amplitude == SMALL:
+                        # USF is of first order in time, and PIC takes that in full; steps fall as the cell to 3/2.
+                        demand, theory = 1.4, "the step decides: theory 1.5"
+                    yield at_least(what, demand, order, f"{theory}; {cost}")
