@@ -28,7 +28,7 @@ COORDINATES = (
     "distribution aspect area points cfl damping speed heading drop offset whole shape steps weight tilt "
     "left right bottom top friction_left friction_bottom margin_x margin_y cell origin geostatic flip settle "
     "softening residual softening_end dilation_end cone anti_locking spin boundary boundary_speed relaxation "
-    "fixed_step shuffle"
+    "fixed_step shuffle transfer"
 ).split()
 
 # Keys of softening, in the order in which the judge takes them.
@@ -101,11 +101,13 @@ def designed_case(index, u):
     if loading.get("relaxation"):
         loading["relaxation_time"] = 0.3 * end_time
     one, rest = share(d["flip"], 0.7, 1.0)
+    transfer = "tpic" if d["transfer"] > 0.7 and weighting != "linear" else "flip"
     no_settle, settle_rest = share(d["settle"], 0.6, 0.0)
     solver = {
         "weighting": weighting,
         "scheme": scheme,
-        "flip": rest if one is None else one,
+        "transfer": transfer,
+        "flip": None if transfer == "tpic" else rest if one is None else one,
         "anti_locking": "cell_average" if d["anti_locking"] > 0.7 else None,
         "cfl": cfl,
         "time_step": step if d["fixed_step"] > 0.92 else None,

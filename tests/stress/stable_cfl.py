@@ -22,6 +22,8 @@ from cases import SCHEMES, WEIGHTINGS, finish, group
 from judge import ENERGY_SLACK, judge
 from sweep import execute, write_case
 
+# Weights and transfer of a column of the table; the others take flip.
+METHODS = [*((weighting, "flip") for weighting in WEIGHTINGS), ("gimp", "tpic"), ("bspline", "tpic")]
 LADDER = [round(0.1 * k, 1) for k in range(1, 16)]
 
 
@@ -63,13 +65,14 @@ SCENES = {
 }
 
 
-def make_case(name, scheme, weighting, cfl):
+def make_case(name, scheme, method, cfl):
     """The case of a scene."""
     scene = SCENES[name]
     body = {"name": "b", "material": "m", "shape": "rectangle", "points_per_cell": 2, **scene["body"]}
     solver = {
-        "weighting": weighting,
+        "weighting": method[0],
         "scheme": scheme,
+        "transfer": method[1],
         "cfl": cfl,
         "end_time": scene["end_time"],
         "settle": 0.0,
@@ -103,16 +106,16 @@ def energies(executable, case):
         return numbers
 
 
-def climb(executable, scene, scheme, weighting):
+def climb(executable, scene, scheme, method):
     """Highest CFL number that is stable with all below it, and the rise of energy at 0.4."""
     highest = 0.0
     for cfl in LADDER:
-        case = make_case(scene, scheme, weighting, cfl)
+        case = make_case(scene, scheme, method, cfl)
         numbers = energies(executable, case)
         if numbers.get("net", math.inf) > ENERGY_SLACK:
             break
         highest = cfl
-    return highest, energies(executable, make_case(scene, scheme, weighting, 0.4)).get("created")
+    return highest, energies(executable, make_case(scene, scheme, method, 0.4)).get("created")
 
 
 def main():
@@ -123,11 +126,11 @@ def main():
     given = parser.parse_args()
     executable = str(given.executable.resolve())
     for scene in given.scenes:
-        print(f"{scene:<12}" + "".join(f"{weighting:>18}" for weighting in WEIGHTINGS))
+        print(f"{scene:<12}" + "".join(f"{' '.join(method).removesuffix(' flip'):>18}" for method in METHODS))
         for scheme in SCHEMES:
             row = f"{scheme:<12}"
-            for weighting in WEIGHTINGS:
-                highest, at_default = climb(executable, scene, scheme, weighting)
+            for method in METHODS:
+                highest, at_default = climb(executable, scene, scheme, method)
                 text = "-" if at_default is None else f"{100 * at_default:.1f} %"
                 row += f"{f'{highest:.1f} ({text})':>18}"
             print(row, flush=True)

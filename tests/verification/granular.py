@@ -3,9 +3,9 @@
 Usage: granular.py --sgimp EXECUTABLE --inputs DIRECTORY --quick
        granular.py --sgimp EXECUTABLE --inputs DIRECTORY --runs DIRECTORY [--pictures DIRECTORY] PART ...
 `--quick` runs a small set in a scratch directory and judges it: exit code 1 if a demand is missed.
-Parts: shear, lube, grid, factors, kumar, kumar_factors, refinement. Each prints Markdown tables and writes CSV files
-into the directory of --runs and, with `--pictures`, PNG files. A run is kept under the hash of its namelist; a second
-call goes on where the first was stopped, so remove the directory after a change of the program.
+Parts: shear, lube, grid, factors, kumar, kumar_factors, refinement, transfers. Each prints Markdown tables and writes
+CSV files into the directory of --runs and, with `--pictures`, PNG files. A run is kept under the hash of its
+namelist; a second call goes on where the first was stopped, so remove the directory after a change of the program.
 All lengths of columns are in units of the initial width. A value is mean +- standard deviation of the members,
 which differ in nothing physical.
 """
@@ -337,6 +337,7 @@ FACTORS = [
     ("scheme usf", {"solver.scheme": "usf"}),
     ("flip share 0.999", {"solver.flip": 0.999}),
     ("flip share 0.99", {"solver.flip": 0.99}),
+    ("transfer tpic", {"solver.transfer": "tpic"}),
     ("weights cpgimp", {"solver.weighting": "cpgimp"}),
     ("weights bspline", {"solver.weighting": "bspline"}),
     ("volumetric strain averaged over cells", {"solver.anti_locking": "cell_average"}),
@@ -348,7 +349,7 @@ FACTORS = [
 
 
 # Those that are also shown for a = 2.
-FACTORS_OF_TALL = [FACTORS[k][0] for k in (0, 1, 2, 3, 7, 8, 10, 13, 14, 19, 22, 24)]
+FACTORS_OF_TALL = [FACTORS[k][0] for k in (0, 1, 2, 3, 7, 8, 10, 13, 14, 19, 22, 23)]
 
 # The friction angle that Kumar's simple shear test (shear over normal stress = tan 22.2) stands for, read as ANGLE is.
 KUMAR_ANGLE = round(float(np.degrees(np.arcsin(np.tan(np.radians(22.2))))), 1)
@@ -395,6 +396,7 @@ def kumar_factors(a):
         ("20 cells", 20),
         ("flip share 0.999", {"solver.flip": 0.999}),
         ("flip share 0.99", {"solver.flip": 0.99}),
+        ("transfer tpic", {"solver.transfer": "tpic"}),
         ("volumetric strain averaged over cells", {"solver.anti_locking": "cell_average"}),
         ("damping 1/s x sqrt(g/width)/10", {"loading.damping": 0.1 * (9.81 / WIDTH) ** 0.5}),
     ]
@@ -510,6 +512,31 @@ def run_refinement(store, options):
     draw_pareto(options, rows)
 
 
+def run_transfers(store, options):
+    """FLIP and TPIC on the calibrated column: fronts, their noise, energy and cost."""
+    table = Table(
+        options.runs / "transfers.csv",
+        *("cell, m", "scheme", "transfer", "members", "99.5 %, m", "connected, m", "farthest, m"),
+        *("energy lost", "CPU s a member"),
+    )
+    for cell, count in ((0.25, 6), (0.125, 6), (0.0625, 2)):
+        for scheme in ("usl", "musl"):
+            for transfer in ("flip", "tpic"):
+                changes = {
+                    "grid.cell_size": cell,
+                    "solver.scheme": scheme,
+                    "solver.transfer": transfer,
+                    "monte_carlo.noise_members": count,
+                }
+                members = store.run("refinement", changes, 1.0)
+                table.add(
+                    *(cell, scheme, transfer, count),
+                    *(members.text(name) for name in ("runout_q995", "runout_connected", "runout_max")),
+                    f"{-100.0 * members.mean('energy_error'):.1f} %",
+                    f"{members.cpu:.1f}",
+                )
+
+
 def new_figure():
     """Axes of one size for all pictures."""
     import matplotlib
@@ -595,18 +622,22 @@ PARTS = {
     "kumar": run_kumar,
     "kumar_factors": run_kumar_factors,
     "refinement": run_refinement,
+    "transfers": run_transfers,
 }
 
 
 # The quick set: aspect ratios at which the demand of 15 % is met.
 QUICK_RATIOS = (0.5, 0.75)
 QUICK_SHARE = 0.15
+# Case 17 misses its demand of 10 %: the aspect ratio, the connected front that docs/granular.md tells, and three
+# standard deviations of its members, for a change to be noticed.
+QUICK_KUMAR = (0.5, 1.000, 0.105)
 # Mass misplaced by cells of 0.25 m against 0.125 m: three times the 2.0 % measured, for the draw that one run is.
 COARSE = 0.06
 
 
 def judge(store):
-    """The quick set: case 16 on 40 cells at the measured angle, and case 18 on the two coarsest grids."""
+    """The quick set: case 16 on 40 cells at the measured angle, case 17, and case 18 on the two coarsest grids."""
     missed = 0
     for a in QUICK_RATIOS:
         members = column(store, "column_lube", a, 40, lube_runout, {"material.friction_angle": ANGLE}, 1)
@@ -616,6 +647,13 @@ def judge(store):
             f"a = {a}: connected front {members.mean('runout_connected'):.3f}, law {lube_runout(a):.3f}, "
             f"{100 * error:+.0f} %, allowed {100 * QUICK_SHARE:.0f} %"
         )
+    a, told, noise = QUICK_KUMAR
+    front = column(store, "column_kumar", a, 40, kumar_runout, members=1).mean("runout_connected")
+    missed += not abs(front - told) <= noise
+    print(
+        f"Kumar, a = {a}: connected front {front:.3f}, reference {kumar_runout(a):.3f}, "
+        f"{percent(front, kumar_runout(a))} (the demand of 10 % is not met), told {told:.3f}, allowed +- {noise}"
+    )
     error = misplaced(refined(store, 0.25, 2, 0.4, 1), refined(store, 0.125, 2, 0.4, 1))
     print(f"misplaced mass, cells of 0.25 m against 0.125 m: {100 * error:.1f} %, allowed {100 * COARSE:.0f} %")
     missed += not error <= COARSE
