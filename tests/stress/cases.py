@@ -124,6 +124,7 @@ def designed_case(index, u):
         text += group("boundary", **draw_boundary(d, grid, cell, speed_of_sound))
     # The circulant method says of some fields that it cannot embed them, before anything runs.
     expect = (0, 2, 4) if "circulant" in field else (0, 4)
+    facts["transfer"] = transfer
     facts.update(
         scheme=scheme,
         weighting=weighting,
