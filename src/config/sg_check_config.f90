@@ -398,8 +398,9 @@ contains
 
     if (desk%good('solver', 1, 'transfer weighting')) then
       ! Their gradients jump between cells: bodies that meet fly apart (tests/verification).
-      if (desk%config%solver%transfer == 'tpic' .and. desk%config%solver%weighting == 'linear') &
+      if (desk%config%solver%transfer == 'tpic' .and. desk%config%solver%weighting == 'linear') then
         call desk%fault('solver', 1, 'transfer', "'tpic' is not stable with weighting = 'linear'")
+      end if
     end if
     if (.not. desk%good('solver', 1, 'time_step end_time')) return
     associate (solver => desk%config%solver)
