@@ -87,9 +87,8 @@ module sg_simulation
     real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
     real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp, elastic_at_start = 0.0_wp
     !> Of the ledger, J/m: work of walls (taken) and body forces at the last look, what they gave
-    !> between looks, and the first and the least mechanical energy less what they gave.
-    real(wp) :: seen_walls = 0.0_wp, seen_forces = 0.0_wp, given = 0.0_wp, first_energy = 0.0_wp
-    real(wp) :: least_energy = 0.0_wp
+    !> between looks, and the least mechanical energy so far less what they gave.
+    real(wp) :: seen_walls = 0.0_wp, seen_forces = 0.0_wp, given = 0.0_wp, least_energy = 0.0_wp
     !> Kinetic energy above which the ledger is looked at at once, J/m.
     real(wp) :: next_look = 0.0_wp
     logical :: settled = .false.
@@ -250,8 +249,7 @@ contains
     clock%potential_at_start = potential_energy(solver%particles, config%loading%gravity)
     clock%energy_at_start = solver%tally%kinetic_energy + clock%potential_at_start
     clock%elastic_at_start = elastic_energy(solver%particles, solver%materials)
-    clock%first_energy = mechanical_energy(clock%potential_at_start, solver)
-    clock%least_energy = clock%first_energy
+    clock%least_energy = clock%energy_at_start + clock%elastic_at_start
   end subroutine start_clock
 
   !> CFL h/(c + v) with the present wave and point speeds, or the fixed step; never past the end.
@@ -337,11 +335,12 @@ contains
         + max(solver%force_work - clock%seen_forces, 0.0_wp)
       clock%seen_walls = solver%wall_work
       clock%seen_forces = solver%force_work
-      energy = mechanical_energy(potential, solver) - clock%given
+      energy = solver%tally%kinetic_energy + potential + elastic_energy(solver%particles, &
+        solver%materials) - clock%given
       clock%least_energy = min(clock%least_energy, energy)
       scale = energy_scale(potential, solver, clock)
       rounding = ENERGY_ROUNDING*(abs(potential) + scene%wave_speed**2*scene%mass)
-      created = (energy - clock%first_energy - rounding)/scale
+      created = (energy - (clock%energy_at_start + clock%elastic_at_start) - rounding)/scale
       regained = (energy - clock%least_energy - rounding)/scale
       clock%next_look = solver%tally%kinetic_energy + MOST_CREATED*scale
       if (.not. created > MOST_CREATED .and. .not. regained > MOST_REGAINED) return
@@ -497,16 +496,6 @@ contains
     scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
       clock%elastic_at_start, abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
   end function energy_scale
-
-  !> Kinetic, potential and elastic energy, J/m; `potential` is the present potential energy.
-  function mechanical_energy(potential, solver) result(energy)
-    real(wp), intent(in) :: potential
-    type(solver_t), intent(in) :: solver
-    real(wp) :: energy
-
-    energy = solver%tally%kinetic_energy + potential + elastic_energy(solver%particles, &
-      solver%materials)
-  end function mechanical_energy
 
   !> The point under stress whose volume is farthest from that at its start, as their `ratio`.
   pure subroutine find_extreme_volume(solver, point, ratio)
