@@ -133,10 +133,10 @@ contains
     this%force_work = 0.0_wp
     this%damping_work = 0.0_wp
     this%wall_work = 0.0_wp
+    call note_all(this)
     call this%average_pressure()
     call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
       0.0_wp)
-    call note_all(this)
     call this%grid%set_window(this%tally)
   end subroutine start
 
@@ -174,6 +174,8 @@ contains
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)
       call this%sweep_points(sweep_t(update_velocity=.true., map_momentum=.true.), time_step)
       call this%grid%remap_velocity()
+      ! That of the gradients counts when they are mapped for good.
+      this%tally%kinetic_energy = 0.0_wp
       call this%sweep_stress(sweep_t(update_stress=.true., move_with=1, map_momentum=.true., &
         map_force=.true.), &
                              time_step)
@@ -306,7 +308,7 @@ contains
       end if
       if (sweep%map_momentum .and. this%carries_gradient) call map_gradient(n, w, &
         p%mass(first:last), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
-        g%x, g%y, g%total_store(g%total_start))
+        g%x, g%y, g%total_store(g%total_start), this%tally%kinetic_energy)
       if (sweep%map_force .and. this%amplitude > 0.0_wp) call this%push_points(time_step, &
         this%materials(body%material), first, last, w)
     end associate

@@ -71,19 +71,31 @@ contains
   end subroutine map_momentum
 
   !> Adds to the momentum of the nodes what the velocities about `n` points differ from those at
-  !> them, L (x_i - x_p); no momentum in sum, since the weights reproduce linear functions.
-  pure subroutine map_gradient(n, w, mass, x, y, gradient, x_axis, y_axis, total)
+  !> them, L (x_i - x_p); no momentum in sum, since the weights reproduce linear functions. Adds
+  !> the kinetic energy of these differences, sum m S |L (x_i - x_p)|^2/2, to `energy` (J/m).
+  pure subroutine map_gradient(n, w, mass, x, y, gradient, x_axis, y_axis, total, energy)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     !> [n], kg/m and m; [4, n], 1/s, in the order of gather_motion_and_gradient.
     real(wp), intent(in) :: mass(n), x(n), y(n), gradient(4, n)
     type(axis_t), intent(in) :: x_axis, y_axis
     real(wp), intent(inout) :: total(8, 0:(x_axis%last + 1)*(y_axis%last + 1) - 1)
-    real(wp) :: dx(BLOCK, 3), dy(BLOCK, 3), at_point(2), along_x(2)
+    real(wp), intent(inout) :: energy
+    real(wp) :: dx(BLOCK, 3), dy(BLOCK, 3), at_point(2), along_x(2), twice
     integer :: p, i, j, node
 
     call find_distances(n, x, w%i, x_axis, dx)
     call find_distances(n, y, w%j, y_axis, dy)
+    ! Mixed terms vanish: sum S (x_i - x_p) = 0.
+    twice = 0.0_wp
+    !$omp simd reduction(+:twice)
+    do p = 1, n
+      twice = twice + mass(p)*((gradient(1, p)**2 + gradient(2, p)**2)*(w%sx(p, 1)*dx(p, 1)**2 &
+        + w%sx(p, 2)*dx(p, 2)**2 + w%sx(p, 3)*dx(p, 3)**2) + (gradient(3, p)**2 &
+        + gradient(4, p)**2)*(w%sy(p, 1)*dy(p, 1)**2 + w%sy(p, 2)*dy(p, 2)**2 &
+        + w%sy(p, 3)*dy(p, 3)**2))
+    end do
+    energy = energy + 0.5_wp*twice
     do p = 1, n
       do j = 1, 3
         node = w%i(p) + (w%j(p) + j - 1)*(x_axis%last + 1) - 1

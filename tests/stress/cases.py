@@ -130,7 +130,7 @@ def designed_case(index, u):
         weighting=weighting,
         cfl=cfl,
         cell=cell,
-        cells=max(1.0, math.sqrt(size[0] * size[1])),
+        cells=max(1.0, min(size)),
         grid=[grid[k] for k in ("x_min", "x_max", "y_min", "y_max")],
         gravity=loading["gravity"],
         boundary=has_boundary,
