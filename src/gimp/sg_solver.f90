@@ -81,7 +81,6 @@ module sg_solver
     procedure, private :: average_pressure
     procedure, private :: average_block
     procedure, private :: push_points
-    procedure, private :: note_block
   end type solver_t
 
 contains
@@ -143,15 +142,22 @@ contains
   !> Bounds, energy and speeds of the initial state.
   subroutine note_all(this)
     type(solver_t), intent(inout) :: this
+    real(wp) :: value(4, BLOCK)
     integer :: first, last, body
 
     call this%tally%reset()
+    value = 0.0_wp
     do body = 1, size(this%particles%bodies)
       do first = this%particles%bodies(body)%first, this%particles%bodies(body)%last, BLOCK
         last = min(first + BLOCK - 1, this%particles%bodies(body)%last)
-        call this%note_block(first, last)
-        this%tally%wave_squared = max(this%tally%wave_squared, wave_speed_squared( &
-          this%particles, this%materials(this%particles%bodies(body)%material), first, last))
+        associate (p => this%particles)
+          value(1, :last - first + 1) = p%vx(first:last)
+          value(2, :last - first + 1) = p%vy(first:last)
+          call move_points(last - first + 1, 0.0_wp, 1, value, p%mass(first:last), &
+            p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
+          this%tally%wave_squared = max(this%tally%wave_squared, wave_speed_squared(p, &
+            this%materials(p%bodies(body)%material), first, last))
+        end associate
       end do
     end do
   end subroutine note_all
@@ -286,9 +292,7 @@ contains
       end if
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
-          p%x(first:last), &
-                         p%y(first:last), this%tally%motion_energy)
-        call this%note_block(first, last)
+          p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
         ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
         if (this%stretches_domains) call this%stretch_domains(body, first, last)
         call this%find_weights(first, last, w)
@@ -320,17 +324,17 @@ contains
     type(sweep_t), intent(in) :: sweep
     integer, intent(in) :: first, last
     type(weights_t), intent(in) :: w
-    real(wp) :: change(last - first + 1)
+    real(wp) :: change(BLOCK)
     integer :: n
 
     n = last - first + 1
     associate (p => this%particles, g => this%grid)
-      change = this%cells%mean(n, p%x(first:last), p%y(first:last)) - 0.5_wp*(p%sxx(first:last) &
-        + p%syy(first:last))
+      change(:n) = this%cells%mean(n, p%x(first:last), p%y(first:last)) &
+        - 0.5_wp*(p%sxx(first:last) + p%syy(first:last))
       if (sweep%map_momentum) call map_momentum(n, w, p%mass(first:last), p%vx(first:last), &
         p%vy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
-      call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change, p%syy(first:last) &
-        + change, p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+      call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change(:n), p%syy(first:last) &
+        + change(:n), p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
     end associate
   end subroutine average_block
 
@@ -400,53 +404,38 @@ contains
     end do
   end subroutine update_velocity
 
-  !> x_p += v dt with v = value(k:k+1, :); adds m v^2/2 to `energy`, in J/m.
-  pure subroutine move_points(n, time_step, k, value, mass, x, y, energy)
+  !> x_p += v dt with v = value(k:k+1, :); adds to the tally.
+  pure subroutine move_points(n, time_step, k, value, mass, vx, vy, x, y, tally)
     integer, intent(in) :: n, k
-    real(wp), intent(in) :: time_step, value(4, BLOCK), mass(n)
-    real(wp), intent(inout) :: x(n), y(n), energy
-    real(wp) :: twice
+    real(wp), intent(in) :: time_step, value(4, BLOCK), mass(n), vx(n), vy(n)
+    real(wp), intent(inout) :: x(n), y(n)
+    type(tally_t), intent(inout) :: tally
+    real(wp) :: x_min, x_max, y_min, y_max, motion, energy, speed_squared, squared
     integer :: p
 
-    twice = 0.0_wp
-    !$omp simd reduction(+:twice)
+    x_min = tally%x_min; x_max = tally%x_max
+    y_min = tally%y_min; y_max = tally%y_max
+    speed_squared = tally%speed_squared
+    motion = 0.0_wp
+    energy = 0.0_wp
+    !$omp simd private(squared) reduction(min:x_min, y_min) &
+    !$omp& reduction(max:x_max, y_max, speed_squared) reduction(+:motion, energy)
     do p = 1, n
       x(p) = x(p) + time_step*value(k, p)
       y(p) = y(p) + time_step*value(k + 1, p)
-      twice = twice + mass(p)*(value(k, p)*value(k, p) + value(k + 1, p)*value(k + 1, p))
+      motion = motion + mass(p)*(value(k, p)*value(k, p) + value(k + 1, p)*value(k + 1, p))
+      x_min = min(x_min, x(p))
+      x_max = max(x_max, x(p))
+      y_min = min(y_min, y(p))
+      y_max = max(y_max, y(p))
+      squared = vx(p)*vx(p) + vy(p)*vy(p)
+      speed_squared = max(speed_squared, squared)
+      energy = energy + mass(p)*squared
     end do
-    energy = energy + 0.5_wp*twice
+    tally%x_min = x_min; tally%x_max = x_max
+    tally%y_min = y_min; tally%y_max = y_max
+    tally%speed_squared = speed_squared
+    tally%motion_energy = tally%motion_energy + 0.5_wp*motion
+    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*energy
   end subroutine move_points
-
-  !> Adds bounds, kinetic energy and the largest speed of the points `first` to `last` to the tally.
-  subroutine note_block(this, first, last)
-    class(solver_t), intent(inout) :: this
-    integer, intent(in) :: first, last
-    real(wp) :: x_min, x_max, y_min, y_max, energy, speed_squared, squared
-    integer :: p
-
-    x_min = this%tally%x_min; x_max = this%tally%x_max
-    y_min = this%tally%y_min; y_max = this%tally%y_max
-    energy = 0.0_wp
-    speed_squared = this%tally%speed_squared
-    associate (x => this%particles%x, y => this%particles%y, vx => this%particles%vx, &
-               vy => this%particles%vy, mass => this%particles%mass)
-      !$omp simd private(squared) reduction(min:x_min, y_min) reduction(max:x_max, y_max, &
-      !$omp& speed_squared) &
-      !$omp& reduction(+:energy)
-      do p = first, last
-        x_min = min(x_min, x(p))
-        x_max = max(x_max, x(p))
-        y_min = min(y_min, y(p))
-        y_max = max(y_max, y(p))
-        squared = vx(p)*vx(p) + vy(p)*vy(p)
-        speed_squared = max(speed_squared, squared)
-        energy = energy + mass(p)*squared
-      end do
-    end associate
-    this%tally%x_min = x_min; this%tally%x_max = x_max
-    this%tally%y_min = y_min; this%tally%y_max = y_max
-    this%tally%speed_squared = speed_squared
-    this%tally%kinetic_energy = this%tally%kinetic_energy + 0.5_wp*energy
-  end subroutine note_block
 end module sg_solver

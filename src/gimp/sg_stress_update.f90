@@ -3,7 +3,7 @@
 module sg_stress_update
   use sg_drucker_prager, only: return_drucker_prager
   use sg_kinds, only: wp
-  use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power, update_volume
+  use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power
   use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_LINEAR_ELASTIC, &
     MODEL_MOHR_COULOMB, MODEL_NEO_HOOKEAN
   use sg_mohr_coulomb, only: close_gap, release_open, return_stress
@@ -30,25 +30,29 @@ contains
     real(wp), intent(in) :: time_step, gradient(4, BLOCK)
     real(wp), intent(inout) :: work, wave_squared
     type(strain_t) :: strain
-    real(wp) :: twice
+    real(wp) :: twice, share(BLOCK)
     integer :: n
 
     n = last - first + 1
+    twice = 0.0_wp
     associate (p => particles)
       if (p%has_deformation()) call update_deformation(n, time_step, gradient, &
         p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), p%fyy(first:last))
-      call find_strain(n, time_step, gradient, strain)
-      twice = stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
-        p%syy(first:last), p%sxy(first:last))
       if (material%model == MODEL_NEO_HOOKEAN) then
+        call find_strain(n, time_step, gradient, strain)
+        twice = stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
+          p%syy(first:last), p%sxy(first:last))
         call hyperelastic_block(p, material, first, last)
       else
-        call update_volume(n, strain, p%volume(first:last))
-        if (material%is_brittle) call release_open(n, material%bulk, p%gap(first:last), &
-          p%sxx(first:last), p%syy(first:last), p%szz(first:last), p%sxy(first:last))
-        if (material%model /= MODEL_LINEAR_ELASTIC) call close_gap(n, strain, p%gap(first:last))
-        call predict_stress(n, material%lame, material%shear, strain, p%sxx(first:last), &
-          p%syy(first:last), p%szz(first:last), p%sxy(first:last))
+        share = 1.0_wp
+        if (has_gap(n, p%gap(first:last))) then
+          if (material%is_brittle) call release_open(n, material%bulk, p%gap(first:last), &
+            p%sxx(first:last), p%syy(first:last), p%szz(first:last), p%sxy(first:last))
+          call close_gap(n, time_step, gradient, p%gap(first:last), share)
+        end if
+        call predict_stress(n, time_step, gradient, share, material%lame, material%shear, &
+          p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%szz(first:last), &
+          p%sxy(first:last), strain, twice)
         if (material%model /= MODEL_LINEAR_ELASTIC) call return_block(p, material, first, last)
       end if
       twice = twice + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
@@ -81,7 +85,7 @@ contains
     type(particles_t), intent(inout) :: p
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
-    real(wp) :: trial(last - first + 1, 4), sin_dilation(last - first + 1)
+    real(wp) :: trial(BLOCK, 4), sin_dilation(BLOCK)
     integer :: n
 
     n = last - first + 1
@@ -92,10 +96,10 @@ contains
       return
     end if
     if (p%has_plastic_strain()) then
-      trial(:, 1) = p%sxx(first:last)
-      trial(:, 2) = p%syy(first:last)
-      trial(:, 3) = p%szz(first:last)
-      trial(:, 4) = p%sxy(first:last)
+      trial(:n, 1) = p%sxx(first:last)
+      trial(:n, 2) = p%syy(first:last)
+      trial(:n, 3) = p%szz(first:last)
+      trial(:n, 4) = p%sxy(first:last)
     end if
     select case (material%model)
     case (MODEL_MOHR_COULOMB)
@@ -137,13 +141,30 @@ contains
   pure function largest_wave_speed(n, modulus, volume, mass, gap) result(squared)
     integer, intent(in) :: n
     real(wp), intent(in) :: modulus, volume(n), mass(n), gap(n)
-    real(wp) :: squared
+    real(wp) :: squared, stiffness
     integer :: p
 
     squared = 0.0_wp
-    !$omp simd reduction(max:squared)
+    !$omp simd private(stiffness) reduction(max:squared)
     do p = 1, n
-      squared = max(squared, merge(modulus*volume(p)/mass(p), 0.0_wp, gap(p) <= 0.0_wp))
+      stiffness = modulus ! what merge chooses from is in registers, or the loop does not vectorise
+      squared = max(squared, merge(stiffness, 0.0_wp, gap(p) <= 0.0_wp)*volume(p)/mass(p))
     end do
   end function largest_wave_speed
+
+  !> Whether one of `n` points has a gap to close.
+  pure function has_gap(n, gap) result(has)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: gap(n)
+    logical :: has
+    real(wp) :: widest
+    integer :: p
+
+    widest = 0.0_wp
+    !$omp simd reduction(max:widest)
+    do p = 1, n
+      widest = max(widest, gap(p))
+    end do
+    has = widest > 0.0_wp
+  end function has_gap
 end module sg_stress_update

@@ -134,11 +134,31 @@ contains
     real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: nx, ny
     real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp) :: nothing(n)
+    real(wp) :: brought(4, BLOCK), along_row(4), along_column(4, 3)
+    integer :: p, i, j, k, node
 
-    nothing = 0.0_wp
-    call map_momentum_and_force(n, w, nothing, nothing, nothing, volume, sxx, syy, sxy, nx, ny, &
-      total)
+    call pack_forces(n, volume, sxx, syy, sxy, brought)
+    do p = 1, n
+      do i = 1, 3
+        !$omp simd
+        do k = 1, 4
+          along_column(k, i) = w%sx(p, i)*WITH_SX(4 + k) + w%gx(p, i)*WITH_GX(4 + k)
+        end do
+      end do
+      do j = 1, 3
+        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
+        !$omp simd
+        do k = 1, 4
+          along_row(k) = (w%sy(p, j)*WITH_SY(4 + k) + w%gy(p, j)*WITH_GY(4 + k))*brought(k, p)
+        end do
+        do i = 1, 3
+          !$omp simd
+          do k = 1, 4
+            total(4 + k, node + i) = total(4 + k, node + i) + along_column(k, i)*along_row(k)
+          end do
+        end do
+      end do
+    end do
   end subroutine map_force
 
   !> map_momentum and map_force in one go through the nodes.
@@ -194,6 +214,22 @@ contains
       end do
     end do
   end subroutine map_body_force
+
+  !> What `n` points bring to the forces of their nodes, in the order of total(5:).
+  pure subroutine pack_forces(n, volume, sxx, syy, sxy, brought)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(inout) :: brought(4, BLOCK)
+    integer :: p
+
+    !$omp simd
+    do p = 1, n
+      brought(1, p) = -volume(p)*sxx(p)
+      brought(2, p) = -volume(p)*sxy(p)
+      brought(3, p) = -volume(p)*sxy(p)
+      brought(4, p) = -volume(p)*syy(p)
+    end do
+  end subroutine pack_forces
 
   !> What `n` points bring to their nodes, in the order of total(:).
   pure subroutine pack_points(n, mass, vx, vy, volume, sxx, syy, sxy, brought)

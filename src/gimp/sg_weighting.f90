@@ -100,7 +100,7 @@ contains
     real(wp) :: left, f, u, d
 
     left = (x - axis%origin)*axis%inverse_cell - 0.5_wp*w
-    base = min(max(floor(left), 0), axis%last_base)
+    base = min(max(int(left), 0), axis%last_base) ! int: floor, but for what is raised to 0
     f = left - real(base, wp)
     u = max(0.0_wp, f + w - 1.0_wp)
     d = max(0.0_wp, 1.0_wp - f - w)
@@ -143,7 +143,7 @@ contains
     !$omp simd private(xi, k, f)
     do p = 1, n
       xi = (x(p) - axis%origin)*axis%inverse_cell
-      k = min(max(floor(xi), 0), axis%last_base)
+      k = min(max(int(xi), 0), axis%last_base)
       f = xi - real(k, wp)
       base(p) = k
       s(p, 1) = 1.0_wp - f
@@ -163,14 +163,16 @@ contains
     integer, intent(inout) :: base(BLOCK)
     real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
     real(wp) :: xi, d, s0, s2, g0, g2, linear
-    integer :: p, k
+    integer :: p, k, first_wall, last_wall
 
+    first_wall = axis%first_wall
+    last_wall = axis%last_wall
     !$omp simd private(xi, k, d, s0, s2, g0, g2, linear)
     do p = 1, n
       xi = (x(p) - axis%origin)*axis%inverse_cell
-      k = min(max(floor(xi - 0.5_wp), 0), axis%last_base)
+      k = min(max(int(xi - 0.5_wp), 0), axis%last_base)
       d = xi - real(k + 1, wp)
-      linear = merge(1.0_wp, 0.0_wp, k + 1 == axis%first_wall .or. k + 1 == axis%last_wall)
+      linear = merge(1.0_wp, 0.0_wp, k + 1 == first_wall .or. k + 1 == last_wall)
       s0 = 0.5_wp*(0.5_wp - d)*(0.5_wp - d)
       s2 = 0.5_wp*(0.5_wp + d)*(0.5_wp + d)
       g0 = d - 0.5_wp

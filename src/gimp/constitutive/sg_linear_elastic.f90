@@ -11,12 +11,11 @@ module sg_linear_elastic
   implicit none
   private
 
-  public :: strain_t, find_strain, update_volume, predict_stress, stress_power
+  public :: strain_t, find_strain, predict_stress, stress_power
 
-  !> Strain increments of up to BLOCK points; exy is the tensor component, `share` the part of the
-  !> increment that strains the material (below 1 only for a point that first has a gap to close).
+  !> Strain increments of up to BLOCK points; exy is the tensor component.
   type :: strain_t
-    real(wp) :: exx(BLOCK), eyy(BLOCK), exy(BLOCK), spin(BLOCK), share(BLOCK)
+    real(wp) :: exx(BLOCK), eyy(BLOCK), exy(BLOCK)
   end type strain_t
 
 contains
@@ -34,68 +33,72 @@ contains
       strain%exx(p) = time_step*gradient(1, p)
       strain%eyy(p) = time_step*gradient(4, p)
       strain%exy(p) = 0.5_wp*time_step*(gradient(2, p) + gradient(3, p))
-      strain%spin(p) = 0.5_wp*time_step*(gradient(2, p) - gradient(3, p))
-      strain%share(p) = 1.0_wp
     end do
   end subroutine find_strain
 
-  !> V grows by exp(tr e), to second order: a pure rotation leaves it alone.
-  pure subroutine update_volume(n, strain, volume)
+  !> Volume and stress after a step without plastic flow. Volume grows by exp(tr e), to second
+  !> order: a pure rotation leaves it alone. Stress turns with the material and takes the elastic
+  !> answer to the `share` of the strain increment that strains it (below 1 only for a point that
+  !> first has a gap to close); `strain` is that share. Adds sum V sigma : e, with the first V and
+  !> sigma, to `power` (J/m).
+  pure subroutine predict_stress(n, time_step, gradient, share, lame, shear, volume, sxx, syy, &
+    szz, sxy, strain, power)
     integer, intent(in) :: n
-    type(strain_t), intent(in) :: strain
-    real(wp), intent(inout) :: volume(n)
-    real(wp) :: trace
+    !> Gradient as in find_strain; Lame's constants in Pa.
+    real(wp), intent(in) :: time_step, gradient(4, BLOCK), share(BLOCK), lame, shear
+    !> m^2 and Pa.
+    real(wp), intent(inout) :: volume(n), sxx(n), syy(n), szz(n), sxy(n)
+    type(strain_t), intent(inout) :: strain
+    real(wp), intent(inout) :: power
+    real(wp) :: half_step, mean, half_difference, shear_stress, trace, turn, cosine, sine, spin
+    real(wp) :: exx, eyy, exy
     integer :: p
 
-    !$omp simd private(trace)
+    half_step = 0.5_wp*time_step
+    !$omp simd private(mean, half_difference, shear_stress, trace, turn, cosine, sine, spin) &
+    !$omp& private(exx, eyy, exy) reduction(+:power)
     do p = 1, n
-      trace = strain%exx(p) + strain%eyy(p)
+      exx = time_step*gradient(1, p)
+      eyy = time_step*gradient(4, p)
+      spin = half_step*(gradient(2, p) - gradient(3, p))
+      trace = exx + eyy
+      exx = share(p)*exx
+      eyy = share(p)*eyy
+      exy = share(p)*half_step*(gradient(2, p) + gradient(3, p))
+      power = power + volume(p)*(sxx(p)*exx + syy(p)*eyy + 2.0_wp*sxy(p)*exy)
       volume(p) = volume(p)*(1.0_wp + trace*(1.0_wp + 0.5_wp*trace))
-    end do
-  end subroutine update_volume
-
-  !> Stress turned with the material, plus the elastic answer to `share` of the strain increment.
-  pure subroutine predict_stress(n, lame, shear, strain, sxx, syy, szz, sxy)
-    integer, intent(in) :: n
-    !> Lame's constants in Pa.
-    real(wp), intent(in) :: lame, shear
-    type(strain_t), intent(in) :: strain
-    real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n)
-    real(wp) :: mean, half_difference, shear_stress, trace, turn, cosine, sine
-    integer :: p
-
-    !$omp simd private(mean, half_difference, shear_stress, trace, turn, cosine, sine)
-    do p = 1, n
       mean = 0.5_wp*(sxx(p) + syy(p))
       half_difference = 0.5_wp*(sxx(p) - syy(p))
       ! cos and sin of twice the rotation angle, tan(angle) = spin
-      turn = 2.0_wp/(1.0_wp + strain%spin(p)*strain%spin(p))
+      turn = 2.0_wp/(1.0_wp + spin*spin)
       cosine = turn - 1.0_wp
-      sine = strain%spin(p)*turn
+      sine = spin*turn
       shear_stress = half_difference*sine + sxy(p)*cosine
       half_difference = half_difference*cosine - sxy(p)*sine
-      trace = strain%share(p)*(strain%exx(p) + strain%eyy(p))
-      mean = mean + (lame + shear)*trace
-      half_difference = half_difference + shear*strain%share(p)*(strain%exx(p) - strain%eyy(p))
+      mean = mean + (lame + shear)*(exx + eyy)
+      half_difference = half_difference + shear*(exx - eyy)
       sxx(p) = mean + half_difference
       syy(p) = mean - half_difference
-      szz(p) = szz(p) + lame*trace
-      sxy(p) = shear_stress + 2.0_wp*shear*strain%share(p)*strain%exy(p)
+      szz(p) = szz(p) + lame*(exx + eyy)
+      sxy(p) = shear_stress + 2.0_wp*shear*exy
+      strain%exx(p) = exx
+      strain%eyy(p) = eyy
+      strain%exy(p) = exy
     end do
   end subroutine predict_stress
 
-  !> Sum over points of V sigma : strain increment, in J/m, for the share of it that meets stress.
-  pure function stress_power(n, strain, volume, sxx, syy, sxy) result(work)
+  !> Sum over points of V sigma : strain increment, in J/m.
+  pure function stress_power(n, strain, volume, sxx, syy, sxy) result(power)
     integer, intent(in) :: n
     type(strain_t), intent(in) :: strain
     real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
-    real(wp) :: work
+    real(wp) :: power
     integer :: p
 
-    work = 0.0_wp
-    !$omp simd reduction(+:work)
+    power = 0.0_wp
+    !$omp simd reduction(+:power)
     do p = 1, n
-      work = work + strain%share(p)*volume(p)*(sxx(p)*strain%exx(p) + syy(p)*strain%eyy(p) &
+      power = power + volume(p)*(sxx(p)*strain%exx(p) + syy(p)*strain%eyy(p) &
         + 2.0_wp*sxy(p)*strain%exy(p))
     end do
   end function stress_power

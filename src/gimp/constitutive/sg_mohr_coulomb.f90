@@ -17,7 +17,6 @@
 !> would come back with several times its volume and full stiffness.
 module sg_mohr_coulomb
   use sg_kinds, only: wp
-  use sg_linear_elastic, only: strain_t
   use sg_materials, only: material_t
   use sg_weighting, only: BLOCK
   implicit none
@@ -61,23 +60,25 @@ module sg_mohr_coulomb
 
 contains
 
-  !> Opens or closes the gap with the volumetric strain increment; `strain%share` becomes the part
-  !> of the increment that is left to strain the material.
-  pure subroutine close_gap(n, strain, gap)
+  !> Opens or closes the gap with the volumetric strain increment; `share` is the part of the
+  !> increment that is left to strain the material.
+  pure subroutine close_gap(n, time_step, gradient, gap, share)
     integer, intent(in) :: n
-    type(strain_t), intent(inout) :: strain
-    real(wp), intent(inout) :: gap(n)
-    real(wp) :: trace, left
+    !> s; 1/s, as in find_strain.
+    real(wp), intent(in) :: time_step, gradient(4, BLOCK)
+    real(wp), intent(inout) :: gap(n), share(BLOCK)
+    real(wp) :: trace, before, left, closed
     integer :: p
 
-    !$omp simd private(trace, left)
+    !$omp simd private(trace, before, left, closed)
     do p = 1, n
-      trace = strain%exx(p) + strain%eyy(p)
-      left = gap(p) + trace
+      trace = time_step*(gradient(1, p) + gradient(4, p))
+      before = gap(p)
+      left = before + trace
       ! gap > 0 and left < 0 imply trace < 0; elsewhere the guarded quotient is not used.
-      strain%share(p) = merge(merge(left/min(trace, -tiny(1.0_wp)), 0.0_wp, left < 0.0_wp), &
-        1.0_wp, gap(p) > 0.0_wp)
-      gap(p) = merge(max(left, 0.0_wp), 0.0_wp, gap(p) > 0.0_wp)
+      closed = min(left, 0.0_wp)/min(trace, -tiny(1.0_wp))
+      share(p) = merge(closed, 1.0_wp, before > 0.0_wp)
+      gap(p) = merge(max(left, 0.0_wp), 0.0_wp, before > 0.0_wp)
     end do
   end subroutine close_gap
 

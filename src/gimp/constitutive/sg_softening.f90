@@ -13,6 +13,7 @@ module sg_softening
   use sg_kinds, only: wp
   use sg_materials, only: material_t, mohr_coulomb_strength
   use sg_mohr_coulomb, only: return_stress
+  use sg_weighting, only: BLOCK
   implicit none
   private
 
@@ -33,13 +34,13 @@ contains
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: friction_angle(n)
     real(wp), intent(inout) :: plastic_strain(n), sxx(n), syy(n), szz(n), sxy(n), gap(n)
-    real(wp) :: trial(n, 4), first_gap(n), kappa(n), next(n), change
+    real(wp) :: trial(BLOCK, 4), first_gap(n), kappa(n), next(n), change
     integer :: round
 
-    trial(:, 1) = sxx
-    trial(:, 2) = syy
-    trial(:, 3) = szz
-    trial(:, 4) = sxy
+    trial(:n, 1) = sxx
+    trial(:n, 2) = syy
+    trial(:n, 3) = szz
+    trial(:n, 4) = sxy
     first_gap = gap
     kappa = plastic_strain
     do round = 1, MOST_ROUNDS
@@ -72,10 +73,10 @@ contains
       if (material%dilation_end > 0.0_wp) sin_dilation = sin(DEGREE*material%dilation_angle &
         *max(1.0_wp - strain/material%dilation_end, 0.0_wp))
       sin_dilation = min(sin_dilation, sin_friction)
-      sxx = trial(:, 1)
-      syy = trial(:, 2)
-      szz = trial(:, 3)
-      sxy = trial(:, 4)
+      sxx = trial(:n, 1)
+      syy = trial(:n, 2)
+      szz = trial(:n, 3)
+      sxy = trial(:n, 4)
       gap = first_gap
       call return_stress(n, material, sin_friction, cohesion_term, tension_limit, sin_dilation, &
         sxx, syy, szz, sxy, gap)
@@ -86,7 +87,7 @@ contains
   !> strain.
   pure function plastic_strain_increment(n, shear, trial, sxx, syy, szz, sxy) result(increment)
     integer, intent(in) :: n
-    real(wp), intent(in) :: shear, trial(n, 4), sxx(n), syy(n), szz(n), sxy(n)
+    real(wp), intent(in) :: shear, trial(BLOCK, 4), sxx(n), syy(n), szz(n), sxy(n)
     real(wp) :: increment(n), dxx, dyy, dzz, dxy, mean
     integer :: p
 
