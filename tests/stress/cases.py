@@ -22,7 +22,7 @@ CONES = ("plane_strain", "plane_strain_associated", "outer", "inner", "equal_are
 # Every combination once in 72 cases. Mohr-Coulomb comes first, so also first in a short sweep.
 COMBINATIONS = tuple(itertools.product(MODELS, WEIGHTINGS, SCHEMES))
 
-# The coordinates of the design, one number in [0, 1) each. Append only: an inserted one changes every case.
+# The coordinates of the design, one number in [0, 1) each. Another one changes every case.
 COORDINATES = (
     "friction dilation cohesion tension young poisson density strength cov scale acf field method "
     "distribution aspect area points cfl damping speed heading drop offset whole shape steps weight tilt "

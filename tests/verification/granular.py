@@ -347,9 +347,21 @@ FACTORS = [
     ("damping 1/s x sqrt(g/width)/10", {"loading.damping": 0.1 * (9.81 / WIDTH) ** 0.5}),
 ]
 
-
 # Those that are also shown for a = 2.
-FACTORS_OF_TALL = [FACTORS[k][0] for k in (0, 1, 2, 3, 7, 8, 10, 13, 14, 19, 22, 23)]
+FACTORS_OF_TALL = (
+    "nothing",
+    f"friction angle {REPOSE} = repose",
+    f"friction angle {ANGLE}: sin(phi) = tan(repose)",
+    "friction angle 40",
+    "softer: E/(rho g width) = 37 as in the paper",
+    "stiffer: E/(rho g width) = 18300",
+    "at rest behind a gate first",
+    "10 cells",
+    "20 cells",
+    "scheme usl",
+    "flip share 0.99",
+    "transfer tpic",
+)
 
 # The friction angle that Kumar's simple shear test (shear over normal stress = tan 22.2) stands for, read as ANGLE is.
 KUMAR_ANGLE = round(float(np.degrees(np.arcsin(np.tan(np.radians(22.2))))), 1)

@@ -1,0 +1,253 @@
+"""Error against run time: every weighting x scheme x cell size x points a cell x CFL number on four scenes.
+
+    pareto.py EXE --out DIR [--jobs J] [--only SCENE ...] [--plot]
+
+manufactured  neo-Hookean square at 5 % strain, points cross cells: largest rms error of displacement, over amplitude
+column        elastic column under its own weight: mean stress error, over the largest stress (Charlton et al. 2017)
+bar           axial vibration of a bar over three periods: rms error of the centre of mass, over its swing
+sand          the paper's homogeneous column, calibrated: error of the 99.5 % front, over that of the finest run
+
+The finest run of the sand column (musl, gimp, cells of 0.0625 m, 3 x 3 points a cell, CFL 0.4) is no exact solution; a
+collapse is a draw, so that errors below its noise (1 %, grey) say nothing. Times are the wall seconds of the member.
+Appends to DIR/pareto.csv and goes on where it stopped; then prints the Pareto fronts and draws them to DIR/pareto.png.
+A run that fails, by name, has no error in the file.
+"""
+
+import argparse
+import concurrent.futures
+import csv
+import itertools
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "verification"))
+
+from cases_column import stress_error  # noqa: E402
+from cases_manufactured import LARGE, error_of  # noqa: E402
+from make_points import lattice, write  # noqa: E402
+from runner import Bench  # noqa: E402
+
+WEIGHTINGS = ("linear", "gimp", "cpgimp", "bspline")
+SCHEMES = ("usf", "usl", "musl")
+SIDES = (2, 3, 4)  # points a cell along each axis
+CFLS = (0.2, 0.4, 0.8)
+CELLS = {
+    "manufactured": (8, 16, 24, 32),
+    "column": (16, 32, 64, 128),
+    "bar": (25, 50, 100, 200),
+    "sand": (10, 20, 30, 40),
+}
+FINEST = {"cells": 80, "weighting": "gimp", "scheme": "musl", "side": 3, "cfl": 0.4}
+COLUMNS = ("scene", "weighting", "scheme", "cells", "side", "cfl", "points", "steps", "seconds", "error", "front")
+BAR_END = 30.0  # s: three periods
+# Errors below say nothing: standard deviation of runs that differ in nothing physical (README).
+NOISE = {"sand": 0.01}
+
+
+def common(setup):
+    """The keys of &solver that every scene takes."""
+    return {f"solver.{key}": setup[key] for key in ("weighting", "scheme", "cfl")}
+
+
+def run_manufactured(bench, setup):
+    """(result, error)"""
+    changes = {
+        "grid.cell_size": 1 / setup["cells"],
+        "loading.amplitude": LARGE,
+        "solver.time_step": None,
+        "body.points_per_cell": setup["side"],
+    }
+    result = bench.run("manufactured", changes | common(setup))
+    return result, error_of(result, LARGE)
+
+
+def run_column(bench, setup):
+    """(result, error)"""
+    size = 50.0 / setup["cells"]
+    changes = {
+        "grid.cell_size": size,
+        "grid.x_max": size,
+        "body.width": size,
+        "grid.y_max": 50.0 + 4.0 * size,
+        "body.points_per_cell": setup["side"],
+        "output.history_interval": 0.0,
+    }
+    result = bench.run("self_weight_column", changes | common(setup))
+    return result, stress_error(result.last)
+
+
+def run_bar(bench, setup):
+    """(result, error)"""
+    size = 25.0 / setup["cells"]
+    spacing = size / setup["side"]
+    x, y = lattice(0.0, 0.0, setup["cells"] * setup["side"], setup["side"], spacing)
+    points = bench.scratch / "bar.csv"
+    write(points, x, y, spacing, 0.1 * np.sin(np.pi * x / 50.0), np.zeros_like(x))
+    changes = {
+        "grid.cell_size": size,
+        "grid.x_max": 28.0,
+        "grid.y_max": size,
+        "body.file": str(points),
+        "solver.end_time": BAR_END,
+    }
+    history = (result := bench.run("bar", changes | common(setup))).history
+    swing = 0.1 * 2 / np.pi / 0.6283185
+    moved = history["centre"][:, 0] - history["centre"][0, 0]
+    return result, np.sqrt(np.mean((moved - swing * np.sin(0.6283185 * history["time"])) ** 2)) / swing
+
+
+def run_sand(bench, setup):
+    """(result, None): its error is known once the finest run is."""
+    changes = {
+        "grid.cell_size": 5.0 / setup["cells"],
+        "grid.y_max": 7.5,
+        "body.points_per_cell": setup["side"],
+        "monte_carlo.noise_members": 1,
+        "output.history_interval": 0.0,
+        "output.snapshot_interval": 8.0,
+    }
+    return bench.run("homogeneous_calibrated", changes | common(setup)), None
+
+
+RUNS = {"manufactured": run_manufactured, "column": run_column, "bar": run_bar, "sand": run_sand}
+
+
+def measure(executable, setup):
+    """One row of the file."""
+    inputs = ROOT / "input" / ("paper" if setup["scene"] == "sand" else "verification")
+    row = dict(setup)
+    with tempfile.TemporaryDirectory() as scratch:
+        try:
+            result, error = RUNS[setup["scene"]](Bench(executable, inputs, scratch), setup)
+        except RuntimeError as failure:
+            if "exit code 4" not in str(failure):
+                raise
+            return row
+    row |= {key: result.row[key] for key in ("steps", "seconds")}
+    row |= {"points": len(result.last.volume), "error": error, "front": float(result.row["runout_q995"])}
+    return row
+
+
+def setups(scenes):
+    """All runs, the finest of the sand first."""
+    if "sand" in scenes:
+        yield {"scene": "sand"} | FINEST
+    for scene in scenes:
+        for weighting, scheme, cells, side, cfl in itertools.product(WEIGHTINGS, SCHEMES, CELLS[scene], SIDES, CFLS):
+            yield {
+                "scene": scene,
+                "weighting": weighting,
+                "scheme": scheme,
+                "cells": cells,
+                "side": side,
+                "cfl": cfl,
+            }
+
+
+def key_of(row):
+    """What a run is known by."""
+    return tuple(str(row[name]) for name in COLUMNS[:6])
+
+
+def read(path):
+    """Rows of the file so far; numbers where they are."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def complete(rows):
+    """Rows that ended well, with numbers; the sand gets its errors."""
+    good = []
+    reference = next(
+        (float(r["front"]) for r in rows if r["scene"] == "sand" and r["cells"] == str(FINEST["cells"])), None
+    )
+    for row in rows:
+        if not row["seconds"] or row["cells"] == str(FINEST["cells"]) and row["scene"] == "sand":
+            continue
+        if row["scene"] == "sand":
+            row["error"] = abs(float(row["front"]) / reference - 1.0)
+        good.append(row | {name: float(row[name]) for name in ("seconds", "error", "cfl")})
+    return good
+
+
+def front_of(scene, rows):
+    """Rows of a scene that no other beats in both time and error, in order of time, down to its noise."""
+    front, best = [], np.inf
+    for row in sorted((r for r in rows if r["scene"] == scene), key=lambda r: (r["seconds"], r["error"])):
+        if row["error"] < best and best > NOISE.get(scene, 0.0):
+            front.append(row)
+            best = row["error"]
+    return front
+
+
+def draw(rows, path):
+    """Error against time, a panel a scene, the fronts as lines."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    colours = dict(zip(WEIGHTINGS, ("#999999", "#0072B2", "#009E73", "#D55E00"), strict=True))
+    marks = dict(zip(SCHEMES, ("s", "^", "o"), strict=True))
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8), layout="constrained")
+    for axis, scene in zip(axes.flat, CELLS, strict=True):
+        here = [r for r in rows if r["scene"] == scene]
+        for weighting, scheme in itertools.product(WEIGHTINGS, SCHEMES):
+            some = [r for r in here if r["weighting"] == weighting and r["scheme"] == scheme]
+            x, y = ([r[name] for r in some] for name in ("seconds", "error"))
+            axis.plot(x, y, marks[scheme], color=colours[weighting], ms=4, alpha=0.6, label=f"{weighting} {scheme}")
+        front = front_of(scene, rows)
+        axis.axhspan(0.0, NOISE.get(scene, 0.0), color="black", alpha=0.1, lw=0)
+        axis.step([r["seconds"] for r in front], [r["error"] for r in front], where="post", color="black", lw=1)
+        axis.set(xscale="log", yscale="log", title=scene, xlabel="run time (s)", ylabel="error (1)")
+        axis.set_ylim(top=2.0)
+    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.savefig(path, dpi=110)
+
+
+def tell(rows):
+    """The fronts as text."""
+    for scene in CELLS:
+        here = [r for r in rows if r["scene"] == scene]
+        if not here:
+            continue
+        print(f"\n{scene}: {len(here)} runs\n{'seconds':>9} {'error':>9}  setup")
+        for r in front_of(scene, rows):
+            setup = f"{r['weighting']} {r['scheme']}, {r['cells']} cells, {r['side']} x {r['side']}, CFL {r['cfl']}"
+            print(f"{r['seconds']:9.4f} {r['error']:9.2e}  {setup}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("executable", type=Path)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--only", nargs="+", choices=CELLS, default=list(CELLS))
+    parser.add_argument("--plot", action="store_true", help="only print and draw what is there")
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    path = given.out / "pareto.csv"
+    done = {key_of(row) for row in read(path)}
+    todo = [] if given.plot else [s for s in setups(given.only) if key_of(s) not in done]
+    with path.open("a", newline="") as file, concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
+        writer = csv.DictWriter(file, COLUMNS)
+        if not done:
+            writer.writeheader()
+        jobs = [pool.submit(measure, given.executable.resolve(), setup) for setup in todo]
+        for job in concurrent.futures.as_completed(jobs):
+            writer.writerow(job.result())
+            file.flush()
+    rows = complete(read(path))
+    tell(rows)
+    draw(rows, given.out / "pareto.png")
+
+
+if __name__ == "__main__":
+    main()
