@@ -46,13 +46,7 @@ contains
     real(wp) :: brought(4, BLOCK), along_row(4)
     integer :: p, i, j, k, node
 
-    !$omp simd
-    do p = 1, n
-      brought(1, p) = mass(p)
-      brought(2, p) = mass(p)*vx(p)
-      brought(3, p) = mass(p)*vy(p)
-      brought(4, p) = 0.0_wp
-    end do
+    call pack_momentum(4, n, mass, vx, vy, brought)
     do p = 1, n
       do j = 1, 3
         node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
@@ -137,7 +131,7 @@ contains
     real(wp) :: brought(4, BLOCK), along_row(4), along_column(4, 3)
     integer :: p, i, j, k, node
 
-    call pack_forces(n, volume, sxx, syy, sxy, brought)
+    call pack_force(4, 0, n, volume, sxx, syy, sxy, brought)
     do p = 1, n
       do i = 1, 3
         !$omp simd
@@ -171,7 +165,8 @@ contains
     real(wp) :: brought(8, BLOCK), along_row(8), along_column(8, 3)
     integer :: p, i, j, k, node
 
-    call pack_points(n, mass, vx, vy, volume, sxx, syy, sxy, brought)
+    call pack_momentum(8, n, mass, vx, vy, brought)
+    call pack_force(8, 4, n, volume, sxx, syy, sxy, brought)
     do p = 1, n
       do i = 1, 3
         !$omp simd simdlen(8)
@@ -215,27 +210,11 @@ contains
     end do
   end subroutine map_body_force
 
-  !> What `n` points bring to the forces of their nodes, in the order of total(5:).
-  pure subroutine pack_forces(n, volume, sxx, syy, sxy, brought)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
-    real(wp), intent(inout) :: brought(4, BLOCK)
-    integer :: p
-
-    !$omp simd
-    do p = 1, n
-      brought(1, p) = -volume(p)*sxx(p)
-      brought(2, p) = -volume(p)*sxy(p)
-      brought(3, p) = -volume(p)*sxy(p)
-      brought(4, p) = -volume(p)*syy(p)
-    end do
-  end subroutine pack_forces
-
-  !> What `n` points bring to their nodes, in the order of total(:).
-  pure subroutine pack_points(n, mass, vx, vy, volume, sxx, syy, sxy, brought)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
-    real(wp), intent(inout) :: brought(8, BLOCK)
+  !> What `n` points bring to the mass and momentum of their nodes, in the order of total(1:4).
+  pure subroutine pack_momentum(lanes, n, mass, vx, vy, brought)
+    integer, intent(in) :: lanes, n
+    real(wp), intent(in) :: mass(n), vx(n), vy(n)
+    real(wp), intent(inout) :: brought(lanes, BLOCK)
     integer :: p
 
     !$omp simd
@@ -244,12 +223,24 @@ contains
       brought(2, p) = mass(p)*vx(p)
       brought(3, p) = mass(p)*vy(p)
       brought(4, p) = 0.0_wp
-      brought(5, p) = -volume(p)*sxx(p)
-      brought(6, p) = -volume(p)*sxy(p)
-      brought(7, p) = -volume(p)*sxy(p)
-      brought(8, p) = -volume(p)*syy(p)
     end do
-  end subroutine pack_points
+  end subroutine pack_momentum
+
+  !> What they bring to the forces, in the order of total(5:8), behind the lane `k`.
+  pure subroutine pack_force(lanes, k, n, volume, sxx, syy, sxy, brought)
+    integer, intent(in) :: lanes, k, n
+    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(inout) :: brought(lanes, BLOCK)
+    integer :: p
+
+    !$omp simd
+    do p = 1, n
+      brought(k + 1, p) = -volume(p)*sxx(p)
+      brought(k + 2, p) = -volume(p)*sxy(p)
+      brought(k + 3, p) = -volume(p)*sxy(p)
+      brought(k + 4, p) = -volume(p)*syy(p)
+    end do
+  end subroutine pack_force
 
   !> value(:, p) = sum of S times motion.
   pure subroutine gather_motion(n, w, nx, ny, motion, value)

@@ -27,8 +27,9 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "verification"))
 
-from cases_column import stress_error  # noqa: E402
+from cases_column import column_changes, stress_error  # noqa: E402
 from cases_manufactured import LARGE, error_of  # noqa: E402
+from judge import pareto_front  # noqa: E402
 from make_points import lattice, write  # noqa: E402
 from runner import Bench  # noqa: E402
 
@@ -68,12 +69,7 @@ def run_manufactured(bench, setup):
 
 def run_column(bench, setup):
     """(result, error)"""
-    size = 50.0 / setup["cells"]
-    changes = {
-        "grid.cell_size": size,
-        "grid.x_max": size,
-        "body.width": size,
-        "grid.y_max": 50.0 + 4.0 * size,
+    changes = column_changes(setup["cells"]) | {
         "body.points_per_cell": setup["side"],
         "output.history_interval": 0.0,
     }
@@ -155,7 +151,7 @@ def key_of(row):
 
 
 def read(path):
-    """Rows of the file so far; numbers where they are."""
+    """Rows of the file so far, as text."""
     if not path.exists():
         return []
     with path.open(newline="") as file:
@@ -165,11 +161,10 @@ def read(path):
 def complete(rows):
     """Rows that ended well, with numbers; the sand gets its errors."""
     good = []
-    reference = next(
-        (float(r["front"]) for r in rows if r["scene"] == "sand" and r["cells"] == str(FINEST["cells"])), None
-    )
+    finest = key_of({"scene": "sand"} | FINEST)
+    reference = next((float(row["front"]) for row in rows if key_of(row) == finest), None)
     for row in rows:
-        if not row["seconds"] or row["cells"] == str(FINEST["cells"]) and row["scene"] == "sand":
+        if not row["seconds"] or key_of(row) == finest:
             continue
         if row["scene"] == "sand":
             row["error"] = abs(float(row["front"]) / reference - 1.0)
@@ -178,13 +173,9 @@ def complete(rows):
 
 
 def front_of(scene, rows):
-    """Rows of a scene that no other beats in both time and error, in order of time, down to its noise."""
-    front, best = [], np.inf
-    for row in sorted((r for r in rows if r["scene"] == scene), key=lambda r: (r["seconds"], r["error"])):
-        if row["error"] < best and best > NOISE.get(scene, 0.0):
-            front.append(row)
-            best = row["error"]
-    return front
+    """The Pareto front of a scene, down to its noise."""
+    here = [row for row in rows if row["scene"] == scene]
+    return pareto_front(here, lambda row: row["seconds"], lambda row: max(row["error"], NOISE.get(scene, 0.0)))
 
 
 def draw(rows, path):
@@ -238,7 +229,7 @@ def main():
     todo = [] if given.plot else [s for s in setups(given.only) if key_of(s) not in done]
     with path.open("a", newline="") as file, concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
         writer = csv.DictWriter(file, COLUMNS)
-        if not done:
+        if file.tell() == 0:
             writer.writeheader()
         jobs = [pool.submit(measure, given.executable.resolve(), setup) for setup in todo]
         for job in concurrent.futures.as_completed(jobs):

@@ -23,6 +23,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from judge import pareto_front
 from runner import change_keys, namelist_text, read_namelist
 
 # Angle of repose of the sand, in degrees: the middle of 30 to 31, taken over and not read from the source.
@@ -616,10 +617,7 @@ def draw_pareto(options, rows):
             )
     for points, mark in zip((4, 9, 16, 25), "os^D", strict=True):
         axes.plot([], [], mark, color="0.5", label=f"{points} points a cell")
-    front = []
-    for row in sorted(rows, key=lambda row: row[4].cpu):
-        if row[3] > 0 and (not front or row[3] < front[-1][3]):
-            front.append(row)
+    front = pareto_front([row for row in rows if row[3] > 0], lambda row: row[4].cpu, lambda row: row[3])
     axes.plot([row[4].cpu for row in front], [100 * row[3] for row in front], "k--", lw=0.8, label="Pareto front")
     axes.set(xscale="log", yscale="log", xlabel="processor time a member, s", ylabel="misplaced mass, %")
     axes.legend(frameon=False, fontsize=8)

@@ -56,6 +56,15 @@ def at_most(quantity, limit, ours, why):
     return Check(quantity, f"at most {limit:g}", f"{ours:.4g}", max(0.0, ours - limit), 0.0, why)
 
 
+def pareto_front(rows, cost, error):
+    """Rows that no other beats in both cost(row) and error(row), in order of cost."""
+    front = []
+    for row in sorted(rows, key=lambda row: (cost(row), error(row))):
+        if not front or error(row) < error(front[-1]):
+            front.append(row)
+    return front
+
+
 def order_of(sizes, errors):
     """Slope of log error over log size, by least squares."""
     return np.polyfit(np.log(sizes), np.log(errors), 1)[0]
