@@ -17,6 +17,17 @@ elseif(SGIMP_ARCH)
   endif()
 endif()
 
+# Longest vectors of the instruction set, for kernels that have a form for each length.
+set(SGIMP_VECTOR_BYTES 32)
+if(CMAKE_BUILD_TYPE STREQUAL "Release")
+  execute_process(COMMAND ${CMAKE_C_COMPILER} ${SGIMP_ARCH_FLAG} -dM -E -x c /dev/null
+    OUTPUT_VARIABLE macros ERROR_QUIET)
+  if(macros MATCHES "__AVX512F__")
+    set(SGIMP_VECTOR_BYTES 64)
+  endif()
+endif()
+configure_file(src/base/sg_vectors.f90.in ${PROJECT_BINARY_DIR}/generated/sg_vectors.f90 @ONLY)
+
 set(SGIMP_FLAGS_ALWAYS "")
 set(SGIMP_FLAGS_RELEASE "")
 set(SGIMP_FLAGS_DEBUG "")

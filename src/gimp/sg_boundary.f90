@@ -103,16 +103,16 @@ contains
       min(box(4), window(4))]
   end function overlap
 
-  !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new), total(1) =
-  !> mass. `taken`: energy that the nodes lost to them in this step, J/m.
+  !> Applies all conditions to the nodes of the window: motion = (v_new - v_old, v_new thrice),
+  !> total(1) = mass. `taken`: energy that the nodes lost to them in this step, J/m.
   pure subroutine apply_conditions(conditions, window, least_mass, nx, ny, total, motion, taken)
     type(condition_t), intent(inout) :: conditions(:)
     !> i_first, i_last, j_first, j_last.
     integer, intent(in) :: window(4)
     real(wp), intent(in) :: least_mass
     integer, intent(in) :: nx, ny
-    !> Comes with zeros in total(4); the forces, total(5:6), are not kept.
-    real(wp), intent(inout) :: total(8, 0:nx, 0:ny), motion(4, 0:nx, 0:ny)
+    !> Comes without a negative number in total(4); the forces, total(5:6), are not kept.
+    real(wp), intent(inout) :: total(8, 0:nx, 0:ny), motion(8, 0:nx, 0:ny)
     real(wp), intent(out) :: taken
     real(wp) :: before(2), after(2)
     integer :: c, i, j, nodes(4)
@@ -127,10 +127,10 @@ contains
             if (.not. total(1, i, j) > least_mass) cycle
             before = motion(3:4, i, j)
             ! What the node would do without any condition stays where its force was.
-            if (.not. total(4, i, j) > 0.0_wp) total(4:6, i, j) = [1.0_wp, before]
+            if (total(4, i, j) >= 0.0_wp) total(4:6, i, j) = [-1.0_wp, before]
             call constrain(this, before, after)
             if (this%kind == KIND_CONTACT) this%touch(i, j) = touch_of(this, before, after)
-            motion(3:4, i, j) = after
+            motion(3:8, i, j) = [after, after, after]
             motion(1:2, i, j) = motion(1:2, i, j) + (after - before)
             this%impulse = this%impulse + total(1, i, j)*(after - before)
           end do
@@ -149,7 +149,7 @@ contains
     type(condition_t), intent(in) :: conditions(:)
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
-    real(wp), intent(in) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(in) :: motion(8, 0:nx, 0:ny)
     real(wp), intent(out) :: taken
     real(wp) :: old(2), after(2)
     integer :: c, i, j, nodes(4)
@@ -159,7 +159,7 @@ contains
       nodes = overlap(conditions(c)%box, window)
       do j = nodes(3), nodes(4)
         do i = nodes(1), nodes(2)
-          if (.not. total(4, i, j) > 0.0_wp) cycle
+          if (.not. total(4, i, j) < 0.0_wp) cycle
           total(4, i, j) = 0.0_wp
           after = motion(3:4, i, j)
           old = after - motion(1:2, i, j)
@@ -205,13 +205,14 @@ contains
     end if
   end subroutine constrain
 
-  !> The velocities motion(3:4) from which strains follow, without impulse: held components, and
+  !> The velocities motion(3:8) from which strains follow, without impulse: held components, and
   !> those that a wall with contact held in the last momentum balance. (To cut off the motion into
   !> the wall alone would make a mean motion out of any noise.)
   pure subroutine hold_conditions(conditions, window, nx, ny, motion)
     type(condition_t), intent(in) :: conditions(:)
     integer, intent(in) :: window(4), nx, ny
-    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(inout) :: motion(8, 0:nx, 0:ny)
+    real(wp) :: v(2)
     integer :: c, i, j, nodes(4)
 
     do c = 1, size(conditions)
@@ -219,12 +220,14 @@ contains
         nodes = overlap(this%box, window)
         do j = nodes(3), nodes(4)
           do i = nodes(1), nodes(2)
+            v = motion(3:4, i, j)
             if (this%kind == KIND_CONTACT) then
-              if (this%touch(i, j) /= TOUCH_NONE) motion(2 + this%normal, i, j) = 0.0_wp
-              if (this%touch(i, j) == TOUCH_STICKS) motion(5 - this%normal, i, j) = 0.0_wp
+              if (this%touch(i, j) /= TOUCH_NONE) v(this%normal) = 0.0_wp
+              if (this%touch(i, j) == TOUCH_STICKS) v(3 - this%normal) = 0.0_wp
             else
-              where (this%held) motion(3:4, i, j) = this%velocity
+              where (this%held) v = this%velocity
             end if
+            motion(3:8, i, j) = [v, v, v]
           end do
         end do
       end associate

@@ -55,7 +55,7 @@ module sg_grid
     !> Mass below which a node counts as empty, kg/m.
     real(wp) :: least_mass
     !> Storage of the nodes. What counts begins at element `total_start` and `motion_start` on a
-    !> cache line, as total(8, 0:nx, 0:ny) and motion(4, 0:nx, 0:ny), see sg_transfer; hand over
+    !> cache line, as total(8, 0:nx, 0:ny) and motion(8, 0:nx, 0:ny), see sg_transfer; hand over
     !> total_store(total_start).
     real(wp), allocatable :: total_store(:), motion_store(:)
     integer :: total_start, motion_start
@@ -122,7 +122,7 @@ contains
       nodes = (nx + 1)*(ny + 1)
     end associate
     this%least_mass = EMPTY_NODE*least_point_mass
-    allocate (this%total_store(8*nodes + ALIGNMENT_SLACK), this%motion_store(4*nodes &
+    allocate (this%total_store(8*nodes + ALIGNMENT_SLACK), this%motion_store(8*nodes &
       + ALIGNMENT_SLACK))
     this%total_store = 0.0_wp
     this%motion_store = 0.0_wp
@@ -167,7 +167,7 @@ contains
   end function node_below
 
   !> a_i = (f_int + f_ext)/m_i - c_d v_i (Eq. 14); v_i += a_i dt; walls. Leaves motion = (v_new -
-  !> v_old, v_new),
+  !> v_old, v_new thrice),
   !> where v_old is the velocity before any wall, so that points also take the impulse of the wall.
   !> Clears the sums.
   subroutine integrate_momentum(this, time_step, gravity, damping, losses)
@@ -191,7 +191,7 @@ contains
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(in) :: least_mass, time_step, gravity(2), damping
     real(wp), intent(in) :: total(8, 0:nx, 0:ny)
-    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(inout) :: motion(8, 0:nx, 0:ny)
     real(wp), intent(out) :: damping_work
     real(wp) :: mass, inverse_mass, vx, vy, dvx, dvy
     integer :: i, j
@@ -208,7 +208,8 @@ contains
             - damping*vx)
           dvy = time_step*((total(6, i, j) + total(8, i, j))*inverse_mass + gravity(2) &
             - damping*vy)
-          motion(:, i, j) = [dvx, dvy, vx + dvx, vy + dvy]
+          motion(1:2, i, j) = [dvx, dvy]
+          motion(3:8, i, j) = [vx + dvx, vy + dvy, vx + dvx, vy + dvy, vx + dvx, vy + dvy]
           damping_work = damping_work + mass*(vx*(vx + 0.5_wp*dvx) + vy*(vy + 0.5_wp*dvy))
         else
           motion(:, i, j) = 0.0_wp
@@ -218,7 +219,7 @@ contains
     damping_work = damping_work*damping*time_step
   end subroutine integrate_nodes
 
-  !> motion(3:4) = p_i/m_i with walls, before the stresses are updated (scheme usf). Keeps the sums.
+  !> motion(3:8) = p_i/m_i, thrice, with walls, before the stresses are updated (scheme usf). Keeps the sums.
   subroutine find_velocity(this)
     class(grid_t), intent(inout) :: this
 
@@ -243,16 +244,18 @@ contains
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(in) :: least_mass
     real(wp), intent(in) :: total(8, 0:nx, 0:ny)
-    real(wp), intent(inout) :: motion(4, 0:nx, 0:ny)
+    real(wp), intent(inout) :: motion(8, 0:nx, 0:ny)
+    real(wp) :: v(2)
     integer :: i, j
 
     do j = window(3), window(4)
       do i = window(1), window(2)
         motion(1:2, i, j) = motion(3:4, i, j)
         if (total(1, i, j) > least_mass) then
-          motion(3:4, i, j) = total(2:3, i, j)/total(1, i, j)
+          v = total(2:3, i, j)/total(1, i, j)
+          motion(3:8, i, j) = [v, v, v]
         else
-          motion(3:4, i, j) = 0.0_wp
+          motion(3:8, i, j) = 0.0_wp
         end if
       end do
     end do

@@ -27,7 +27,8 @@ module sg_particles
     real(wp), allocatable :: x(:), y(:), vx(:), vy(:)
     !> Initial position, [count], in m.
     real(wp), allocatable :: x_start(:), y_start(:)
-    !> Mass in kg/m and current volume in m^2 (per metre of thickness), [count].
+    !> Mass in kg/m, the same for all points of a body, and current volume in m^2 (per metre of
+    !> thickness), [count].
     real(wp), allocatable :: mass(:), volume(:)
     !> Full width and height of the domain of a point, [count], in m; they change with cpGIMP only.
     real(wp), allocatable :: width(:), height(:)

@@ -142,7 +142,7 @@ contains
   !> Bounds, energy and speeds of the initial state.
   subroutine note_all(this)
     type(solver_t), intent(inout) :: this
-    real(wp) :: value(4, BLOCK)
+    real(wp) :: value(BLOCK, 4)
     integer :: first, last, body
 
     call this%tally%reset()
@@ -151,9 +151,9 @@ contains
       do first = this%particles%bodies(body)%first, this%particles%bodies(body)%last, BLOCK
         last = min(first + BLOCK - 1, this%particles%bodies(body)%last)
         associate (p => this%particles)
-          value(1, :last - first + 1) = p%vx(first:last)
-          value(2, :last - first + 1) = p%vy(first:last)
-          call move_points(last - first + 1, 0.0_wp, 1, value, p%mass(first:last), &
+          value(:last - first + 1, 1) = p%vx(first:last)
+          value(:last - first + 1, 2) = p%vy(first:last)
+          call move_points(last - first + 1, 0.0_wp, 1, value, p%mass(first), &
             p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
           this%tally%wave_squared = max(this%tally%wave_squared, wave_speed_squared(p, &
             this%materials(p%bodies(body)%material), first, last))
@@ -252,7 +252,7 @@ contains
     type(body_points_t), intent(in) :: body
     integer, intent(in) :: first, last
     type(weights_t) :: w
-    real(wp) :: value(4, BLOCK), gradient(4, BLOCK), change(BLOCK)
+    real(wp) :: value(BLOCK, 4), gradient(BLOCK, 4), change(BLOCK)
     logical :: keep_gradient
     integer :: n
 
@@ -273,25 +273,25 @@ contains
       end if
       if (sweep%average_divergence) then
         call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), &
-          gradient(1, :n) + gradient(4, :n))
+          gradient(:n, 1) + gradient(:n, 4))
         return
       end if
-      if (keep_gradient) p%velocity_gradient(:, first:last) = gradient(:, :n)
+      if (keep_gradient) p%velocity_gradient(:, first:last) = transpose(gradient(:n, :))
       if (sweep%update_velocity) then
         call update_velocity(n, this%flip, value, p%vx(first:last), p%vy(first:last))
       end if
       if (sweep%update_stress) then
         if (this%averages_cells) then
           change(:n) = 0.5_wp*(this%cells%mean(n, p%x(first:last), p%y(first:last)) &
-            - (gradient(1, :n) + gradient(4, :n)))
-          gradient(1, :n) = gradient(1, :n) + change(:n)
-          gradient(4, :n) = gradient(4, :n) + change(:n)
+            - (gradient(:n, 1) + gradient(:n, 4)))
+          gradient(:n, 1) = gradient(:n, 1) + change(:n)
+          gradient(:n, 4) = gradient(:n, 4) + change(:n)
         end if
         call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
           this%tally%internal_work, this%tally%wave_squared)
       end if
       if (sweep%move_with > 0) then
-        call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
+        call move_points(n, time_step, sweep%move_with, value, p%mass(first), &
           p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
         ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
         if (this%stretches_domains) call this%stretch_domains(body, first, last)
@@ -300,18 +300,18 @@ contains
       if (this%averages_cells .and. sweep%map_force) then
         call this%average_block(sweep, first, last, w)
       else if (sweep%map_momentum .and. sweep%map_force) then
-        call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
+        call map_momentum_and_force(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
           p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%sxy(first:last), &
           g%x%last, g%y%last, g%total_store(g%total_start))
       else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), g%x%last, &
+        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), g%x%last, &
           g%y%last, g%total_store(g%total_start))
       else if (sweep%map_force) then
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
                        p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       end if
       if (sweep%map_momentum .and. this%carries_gradient) call map_gradient(n, w, &
-        p%mass(first:last), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
+        p%mass(first), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
         g%x, g%y, g%total_store(g%total_start), this%tally%kinetic_energy)
       if (sweep%map_force .and. this%amplitude > 0.0_wp) call this%push_points(time_step, &
         this%materials(body%material), first, last, w)
@@ -331,7 +331,7 @@ contains
     associate (p => this%particles, g => this%grid)
       change(:n) = this%cells%mean(n, p%x(first:last), p%y(first:last)) &
         - 0.5_wp*(p%sxx(first:last) + p%syy(first:last))
-      if (sweep%map_momentum) call map_momentum(n, w, p%mass(first:last), p%vx(first:last), &
+      if (sweep%map_momentum) call map_momentum(n, w, p%mass(first), p%vx(first:last), &
         p%vy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change(:n), p%syy(first:last) &
         + change(:n), p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
@@ -352,10 +352,10 @@ contains
     associate (p => this%particles, g => this%grid)
       call manufactured_force(n, material, this%amplitude, this%time, p%x_start(first:last), &
         p%y_start(first:last), bx, by)
-      call map_body_force(n, w, p%mass(first:last), bx, by, g%x%last, g%y%last, &
+      call map_body_force(n, w, p%mass(first), bx, by, g%x%last, g%y%last, &
         g%total_store(g%total_start))
-      this%force_work = this%force_work + time_step*sum(p%mass(first:last)*(p%vx(first:last) &
-        *bx(:n) + p%vy(first:last)*by(:n)))
+      this%force_work = this%force_work + time_step*p%mass(first)*sum(p%vx(first:last)*bx(:n) &
+        + p%vy(first:last)*by(:n))
     end associate
   end subroutine push_points
 
@@ -370,6 +370,7 @@ contains
     associate (p => this%particles, g => this%grid)
       call this%axis_weights(n, p%x(first:last), p%width(first:last), g%x, w%i, w%sx, w%gx)
       call this%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, w%gy)
+      call w%number_nodes(n, g%x%last)
     end associate
   end subroutine find_weights
 
@@ -393,21 +394,21 @@ contains
   !> v_p = flip (v_p + sum S dv_i) + (1 - flip) sum S v_i.
   pure subroutine update_velocity(n, flip, value, vx, vy)
     integer, intent(in) :: n
-    real(wp), intent(in) :: flip, value(4, BLOCK)
+    real(wp), intent(in) :: flip, value(BLOCK, 4)
     real(wp), intent(inout) :: vx(n), vy(n)
     integer :: p
 
     !$omp simd
     do p = 1, n
-      vx(p) = flip*(vx(p) + value(1, p)) + (1.0_wp - flip)*value(3, p)
-      vy(p) = flip*(vy(p) + value(2, p)) + (1.0_wp - flip)*value(4, p)
+      vx(p) = flip*(vx(p) + value(p, 1)) + (1.0_wp - flip)*value(p, 3)
+      vy(p) = flip*(vy(p) + value(p, 2)) + (1.0_wp - flip)*value(p, 4)
     end do
   end subroutine update_velocity
 
-  !> x_p += v dt with v = value(k:k+1, :); adds to the tally.
+  !> x_p += v dt with v = value(:, k:k+1) for points of the same `mass`, kg/m; adds to the tally.
   pure subroutine move_points(n, time_step, k, value, mass, vx, vy, x, y, tally)
     integer, intent(in) :: n, k
-    real(wp), intent(in) :: time_step, value(4, BLOCK), mass(n), vx(n), vy(n)
+    real(wp), intent(in) :: time_step, value(BLOCK, 4), mass, vx(n), vy(n)
     real(wp), intent(inout) :: x(n), y(n)
     type(tally_t), intent(inout) :: tally
     real(wp) :: x_min, x_max, y_min, y_max, motion, energy, speed_squared, squared
@@ -421,21 +422,21 @@ contains
     !$omp simd private(squared) reduction(min:x_min, y_min) &
     !$omp& reduction(max:x_max, y_max, speed_squared) reduction(+:motion, energy)
     do p = 1, n
-      x(p) = x(p) + time_step*value(k, p)
-      y(p) = y(p) + time_step*value(k + 1, p)
-      motion = motion + mass(p)*(value(k, p)*value(k, p) + value(k + 1, p)*value(k + 1, p))
+      x(p) = x(p) + time_step*value(p, k)
+      y(p) = y(p) + time_step*value(p, k + 1)
+      motion = motion + value(p, k)*value(p, k) + value(p, k + 1)*value(p, k + 1)
       x_min = min(x_min, x(p))
       x_max = max(x_max, x(p))
       y_min = min(y_min, y(p))
       y_max = max(y_max, y(p))
       squared = vx(p)*vx(p) + vy(p)*vy(p)
       speed_squared = max(speed_squared, squared)
-      energy = energy + mass(p)*squared
+      energy = energy + squared
     end do
     tally%x_min = x_min; tally%x_max = x_max
     tally%y_min = y_min; tally%y_max = y_max
     tally%speed_squared = speed_squared
-    tally%motion_energy = tally%motion_energy + 0.5_wp*motion
-    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*energy
+    tally%motion_energy = tally%motion_energy + 0.5_wp*mass*motion
+    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*mass*energy
   end subroutine move_points
 end module sg_solver

@@ -27,7 +27,7 @@ contains
     type(particles_t), intent(inout) :: particles
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
-    real(wp), intent(in) :: time_step, gradient(4, BLOCK)
+    real(wp), intent(in) :: time_step, gradient(BLOCK, 4)
     real(wp), intent(inout) :: work, wave_squared
     type(strain_t) :: strain
     real(wp) :: twice, share(BLOCK)
@@ -133,23 +133,25 @@ contains
         p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), p%fyy(first:last))
     else
       squared = largest_wave_speed(n, material%lame + 2.0_wp*material%shear, &
-        p%volume(first:last), p%mass(first:last), p%gap(first:last))
+        p%mass(first), p%volume(first:last), p%gap(first:last))
     end if
   end function wave_speed_squared
 
   !> Square of the largest wave speed, M V/m, among points without a gap, in (m/s)^2.
-  pure function largest_wave_speed(n, modulus, volume, mass, gap) result(squared)
+  pure function largest_wave_speed(n, modulus, mass, volume, gap) result(squared)
     integer, intent(in) :: n
-    real(wp), intent(in) :: modulus, volume(n), mass(n), gap(n)
-    real(wp) :: squared, stiffness
+    !> Pa; of one point, kg/m; m^2.
+    real(wp), intent(in) :: modulus, mass, volume(n), gap(n)
+    real(wp) :: squared, largest, here
     integer :: p
 
-    squared = 0.0_wp
-    !$omp simd private(stiffness) reduction(max:squared)
+    largest = 0.0_wp
+    !$omp simd private(here) reduction(max:largest)
     do p = 1, n
-      stiffness = modulus ! what merge chooses from is in registers, or the loop does not vectorise
-      squared = max(squared, merge(stiffness, 0.0_wp, gap(p) <= 0.0_wp)*volume(p)/mass(p))
+      here = volume(p) ! what merge chooses from is in registers, or the loop does not vectorise
+      largest = max(largest, merge(here, 0.0_wp, gap(p) <= 0.0_wp))
     end do
+    squared = modulus*largest/mass
   end function largest_wave_speed
 
   !> Whether one of `n` points has a gap to close.

@@ -34,10 +34,13 @@ module sg_weighting
 
   !> Weights of up to BLOCK points.
   type :: weights_t
-    !> First node of the stencil in x and y, counted from 0.
-    integer :: i(BLOCK), j(BLOCK)
+    !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1), with -1
+    !> behind the last point.
+    integer :: i(BLOCK), j(BLOCK), node(BLOCK + 1)
     !> Weights and slopes (1/m) along x and along y: point, node of the stencil.
     real(wp) :: sx(BLOCK, 3), sy(BLOCK, 3), gx(BLOCK, 3), gy(BLOCK, 3)
+  contains
+    procedure :: number_nodes
   end type weights_t
 
   !> The nodes along one axis.
@@ -67,6 +70,19 @@ module sg_weighting
   end interface
 
 contains
+
+  !> Numbers the first nodes of `n` points in a grid whose rows end with node `nx`.
+  pure subroutine number_nodes(this, n, nx)
+    class(weights_t), intent(inout) :: this
+    integer, intent(in) :: n, nx
+    integer :: p
+
+    !$omp simd
+    do p = 1, n
+      this%node(p) = this%i(p) + this%j(p)*(nx + 1)
+    end do
+    this%node(n + 1) = -1
+  end subroutine number_nodes
 
   !> uGIMP; see the head of the module.
   pure subroutine gimp_axis_weights(n, x, width, axis, base, s, g)

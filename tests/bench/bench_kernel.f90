@@ -74,7 +74,7 @@ contains
     type(solver_t) :: solver
     type(weights_t) :: w
     type(losses_t) :: losses
-    real(wp) :: value(4, BLOCK), gradient(4, BLOCK), ns(5), started, ended, work, wave_squared
+    real(wp) :: value(BLOCK, 4), gradient(BLOCK, 4), ns(5), started, ended, work, wave_squared
     character(len=24), parameter :: NAMES(5) = [character(len=24) :: 'weights (twice)', 'gather', &
       'strain and stress', 'map to nodes', 'nodes']
     integer :: repeat, first, last, n, part
@@ -105,6 +105,7 @@ contains
                 w%gx)
               call solver%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, &
                 w%gy)
+              call w%number_nodes(n, g%x%last)
             case (2)
               call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &
                 g%motion_store(g%motion_start), value, gradient)
@@ -112,7 +113,7 @@ contains
               gradient = 0.0_wp
               call update_stress(p, m, first, last, 1.0e-3_wp, gradient, work, wave_squared)
             case (4)
-              call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), &
+              call map_momentum_and_force(n, w, p%mass(first), p%vx(first:last), &
                 p%vy(first:last), &
                                           p%volume(first:last), p%sxx(first:last), &
                                           p%syy(first:last), &

@@ -20,19 +20,19 @@ module sg_linear_elastic
 
 contains
 
-  !> Strain increments from gradient(:, p) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy).
+  !> Strain increments from gradient(p, :) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy).
   pure subroutine find_strain(n, time_step, gradient, strain)
     integer, intent(in) :: n
     real(wp), intent(in) :: time_step
-    real(wp), intent(in) :: gradient(4, BLOCK)
+    real(wp), intent(in) :: gradient(BLOCK, 4)
     type(strain_t), intent(inout) :: strain
     integer :: p
 
     !$omp simd
     do p = 1, n
-      strain%exx(p) = time_step*gradient(1, p)
-      strain%eyy(p) = time_step*gradient(4, p)
-      strain%exy(p) = 0.5_wp*time_step*(gradient(2, p) + gradient(3, p))
+      strain%exx(p) = time_step*gradient(p, 1)
+      strain%eyy(p) = time_step*gradient(p, 4)
+      strain%exy(p) = 0.5_wp*time_step*(gradient(p, 2) + gradient(p, 3))
     end do
   end subroutine find_strain
 
@@ -45,7 +45,7 @@ contains
     szz, sxy, strain, power)
     integer, intent(in) :: n
     !> Gradient as in find_strain; Lame's constants in Pa.
-    real(wp), intent(in) :: time_step, gradient(4, BLOCK), share(BLOCK), lame, shear
+    real(wp), intent(in) :: time_step, gradient(BLOCK, 4), share(BLOCK), lame, shear
     !> m^2 and Pa.
     real(wp), intent(inout) :: volume(n), sxx(n), syy(n), szz(n), sxy(n)
     type(strain_t), intent(inout) :: strain
@@ -58,13 +58,13 @@ contains
     !$omp simd private(mean, half_difference, shear_stress, trace, turn, cosine, sine, spin) &
     !$omp& private(exx, eyy, exy) reduction(+:power)
     do p = 1, n
-      exx = time_step*gradient(1, p)
-      eyy = time_step*gradient(4, p)
-      spin = half_step*(gradient(2, p) - gradient(3, p))
+      exx = time_step*gradient(p, 1)
+      eyy = time_step*gradient(p, 4)
+      spin = half_step*(gradient(p, 2) - gradient(p, 3))
       trace = exx + eyy
       exx = share(p)*exx
       eyy = share(p)*eyy
-      exy = share(p)*half_step*(gradient(2, p) + gradient(3, p))
+      exy = share(p)*half_step*(gradient(p, 2) + gradient(p, 3))
       power = power + volume(p)*(sxx(p)*exx + syy(p)*eyy + 2.0_wp*sxy(p)*exy)
       volume(p) = volume(p)*(1.0_wp + trace*(1.0_wp + 0.5_wp*trace))
       mean = 0.5_wp*(sxx(p) + syy(p))

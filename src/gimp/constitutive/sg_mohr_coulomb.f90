@@ -65,14 +65,14 @@ contains
   pure subroutine close_gap(n, time_step, gradient, gap, share)
     integer, intent(in) :: n
     !> s; 1/s, as in find_strain.
-    real(wp), intent(in) :: time_step, gradient(4, BLOCK)
+    real(wp), intent(in) :: time_step, gradient(BLOCK, 4)
     real(wp), intent(inout) :: gap(n), share(BLOCK)
     real(wp) :: trace, before, left, closed
     integer :: p
 
     !$omp simd private(trace, before, left, closed)
     do p = 1, n
-      trace = time_step*(gradient(1, p) + gradient(4, p))
+      trace = time_step*(gradient(p, 1) + gradient(p, 4))
       before = gap(p)
       left = before + trace
       ! gap > 0 and left < 0 imply trace < 0; elsewhere the guarded quotient is not used.

@@ -13,10 +13,10 @@ module sg_neo_hookean
 
 contains
 
-  !> F <- (I + dt L) F with gradient(:, p) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy).
+  !> F <- (I + dt L) F with gradient(p, :) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy).
   pure subroutine update_deformation(n, time_step, gradient, fxx, fxy, fyx, fyy)
     integer, intent(in) :: n
-    real(wp), intent(in) :: time_step, gradient(4, BLOCK)
+    real(wp), intent(in) :: time_step, gradient(BLOCK, 4)
     real(wp), intent(inout) :: fxx(n), fxy(n), fyx(n), fyy(n)
     real(wp) :: old_x, old_y
     integer :: p
@@ -25,12 +25,12 @@ contains
     do p = 1, n
       old_x = fxx(p)
       old_y = fyx(p)
-      fxx(p) = old_x + time_step*(gradient(1, p)*old_x + gradient(3, p)*old_y)
-      fyx(p) = old_y + time_step*(gradient(2, p)*old_x + gradient(4, p)*old_y)
+      fxx(p) = old_x + time_step*(gradient(p, 1)*old_x + gradient(p, 3)*old_y)
+      fyx(p) = old_y + time_step*(gradient(p, 2)*old_x + gradient(p, 4)*old_y)
       old_x = fxy(p)
       old_y = fyy(p)
-      fxy(p) = old_x + time_step*(gradient(1, p)*old_x + gradient(3, p)*old_y)
-      fyy(p) = old_y + time_step*(gradient(2, p)*old_x + gradient(4, p)*old_y)
+      fxy(p) = old_x + time_step*(gradient(p, 1)*old_x + gradient(p, 3)*old_y)
+      fyy(p) = old_y + time_step*(gradient(p, 2)*old_x + gradient(p, 4)*old_y)
     end do
   end subroutine update_deformation
 
