@@ -209,7 +209,8 @@ contains
           dvy = time_step*((total(6, i, j) + total(8, i, j))*inverse_mass + gravity(2) &
             - damping*vy)
           motion(1:2, i, j) = [dvx, dvy]
-          motion(3:8, i, j) = [vx + dvx, vy + dvy, vx + dvx, vy + dvy, vx + dvx, vy + dvy]
+          motion(3:8, i, j) = [vx + dvx, vy + dvy, vx + dvx, vy + dvy, vx + dvx, &
+            vy + dvy]
           damping_work = damping_work + mass*(vx*(vx + 0.5_wp*dvx) + vy*(vy + 0.5_wp*dvy))
         else
           motion(:, i, j) = 0.0_wp

@@ -34,9 +34,8 @@ module sg_weighting
 
   !> Weights of up to BLOCK points.
   type :: weights_t
-    !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1), with -1
-    !> behind the last point.
-    integer :: i(BLOCK), j(BLOCK), node(BLOCK + 1)
+    !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1).
+    integer :: i(BLOCK), j(BLOCK), node(BLOCK)
     !> Weights and slopes (1/m) along x and along y: point, node of the stencil.
     real(wp) :: sx(BLOCK, 3), sy(BLOCK, 3), gx(BLOCK, 3), gy(BLOCK, 3)
   contains
@@ -81,7 +80,6 @@ contains
     do p = 1, n
       this%node(p) = this%i(p) + this%j(p)*(nx + 1)
     end do
-    this%node(n + 1) = -1
   end subroutine number_nodes
 
   !> uGIMP; see the head of the module.

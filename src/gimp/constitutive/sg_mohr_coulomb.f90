@@ -115,20 +115,20 @@ contains
     real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n)
     real(wp), intent(inout) :: gap(n)
     type(principal_t) :: trial
-    real(wp) :: d_first, d_middle, d_last, friction_part, high, middle, low, new_a, new_b
+    real(wp) :: d_first, d_middle, d_last, high, middle, low, new_a, new_b, compliance(BLOCK)
     real(wp) :: centre, yield, multiplier, ratio, stress(4), opening
     ! Above 0: the plane is not where the point belongs. A real and not a logical, so that the loop
     ! vectorises.
     real(wp) :: violation(BLOCK)
     integer :: p
 
+    call find_compliance(n, material, sin_friction, sin_dilation, compliance)
     !$omp simd private(centre, high, middle, low, yield, multiplier, new_a, new_b, ratio) &
-    !$omp& private(d_first, d_middle, d_last, friction_part)
+    !$omp& private(d_first, d_middle, d_last)
     do p = 1, n
       d_middle = 2.0_wp*material%lame*sin_dilation(p)
       d_first = d_middle + 2.0_wp*material%shear*(1.0_wp + sin_dilation(p))
       d_last = d_middle - 2.0_wp*material%shear*(1.0_wp - sin_dilation(p))
-      friction_part = 4.0_wp*((material%lame + material%shear)*sin_dilation(p))
       centre = 0.5_wp*(sxx(p) + syy(p))
       trial%half_difference(p) = 0.5_wp*(sxx(p) - syy(p))
       trial%shear_stress(p) = sxy(p)
@@ -140,7 +140,7 @@ contains
       low = min(trial%b(p), trial%z(p))
       middle = max(min(trial%a(p), trial%z(p)), trial%b(p))
       yield = (high - low) + (high + low)*sin_friction(p) - cohesion_term(p)
-      multiplier = max(yield, 0.0_wp)/(4.0_wp*material%shear + friction_part*sin_friction(p))
+      multiplier = max(yield, 0.0_wp)*compliance(p)
       high = high - multiplier*d_first
       middle = middle - multiplier*d_middle
       low = low - multiplier*d_last
@@ -166,6 +166,26 @@ contains
       gap(p) = gap(p) + opening
     end do
   end subroutine return_stress
+
+  !> Multiplier of the plane over the yield function, 1/(4 G + 4 (lambda + G) sin(phi) sin(psi)), in
+  !> 1/Pa: the same for all points that do not dilate, who are spared the division.
+  pure subroutine find_compliance(n, material, sin_friction, sin_dilation, compliance)
+    integer, intent(in) :: n
+    type(material_t), intent(in) :: material
+    real(wp), intent(in) :: sin_friction(n), sin_dilation(n)
+    real(wp), intent(inout) :: compliance(BLOCK)
+    integer :: p
+
+    if (material%sin_dilation > 0.0_wp) then
+      !$omp simd
+      do p = 1, n
+        compliance(p) = 1.0_wp/(4.0_wp*material%shear + 4.0_wp*((material%lame &
+          + material%shear)*sin_dilation(p))*sin_friction(p))
+      end do
+    else
+      compliance = 1.0_wp/(4.0_wp*material%shear)
+    end if
+  end subroutine find_compliance
 
   !> Point `p` of the block, whose return is not to the plane: sorts its principal stresses, returns
   !> them, and turns them back to `stress` = (xx, yy, zz, xy). `opening`: volumetric strain that the
