@@ -67,18 +67,22 @@ contains
     !> s; 1/s, as in find_strain.
     real(wp), intent(in) :: time_step, gradient(BLOCK, 4)
     real(wp), intent(inout) :: gap(n), share(BLOCK)
-    real(wp) :: trace, before, left, closed
+    real(wp) :: left(BLOCK), trace, before, least
     integer :: p
 
-    !$omp simd private(trace, before, left, closed)
+    least = 0.0_wp
+    !$omp simd private(trace, before) reduction(min:least)
     do p = 1, n
       trace = time_step*(gradient(p, 1) + gradient(p, 4))
       before = gap(p)
-      left = before + trace
-      ! gap > 0 and left < 0 imply trace < 0; elsewhere the guarded quotient is not used.
-      closed = min(left, 0.0_wp)/min(trace, -tiny(1.0_wp))
-      share(p) = merge(closed, 1.0_wp, before > 0.0_wp)
-      gap(p) = merge(max(left, 0.0_wp), 0.0_wp, before > 0.0_wp)
+      left(p) = merge(before + trace, 0.0_wp, before > 0.0_wp)
+      least = min(least, left(p))
+      share(p) = merge(0.0_wp, 1.0_wp, before > 0.0_wp)
+      gap(p) = max(left(p), 0.0_wp)
+    end do
+    if (.not. least < 0.0_wp) return
+    do p = 1, n
+      if (left(p) < 0.0_wp) share(p) = left(p)/(time_step*(gradient(p, 1) + gradient(p, 4)))
     end do
   end subroutine close_gap
 
