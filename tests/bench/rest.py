@@ -17,9 +17,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from launch import environment, on_ranks
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
-from runner import change_keys, namelist_text, read_namelist
+from runner import read_namelist, write_changed
 
 RUNOUTS = ("runout_max", "runout_q99", "runout_q995", "runout_connected")
 COLUMNS = (*RUNOUTS, "status", "settled", "settle_time", "steps")
@@ -33,6 +34,8 @@ def arguments():
     parser.add_argument("--settle", type=float, nargs="+", help="shares of the peak; as the case has it")
     parser.add_argument("--realizations", type=int, help="of each case of the study; as the case has it")
     parser.add_argument("--end-time", type=float, help="of all runs, in s; as the case has it")
+    parser.add_argument("--ranks", type=int, default=1)
+    parser.add_argument("--mpiexec", default="mpirun")
     parser.add_argument("--scratch", type=Path, help="keeps the runs here")
     parser.add_argument("--most", nargs="*", default=[], metavar="RUNOUT=CELLS")
     return parser.parse_args()
@@ -40,18 +43,18 @@ def arguments():
 
 def run(options, scratch, settle):
     """Columns of all members of the case, [members], by name; nominal is where the case is homogeneous."""
-    groups = read_namelist(options.case)
     changes = {"solver.settle": settle, "output.snapshot_members": None, "output.snapshot_interval": None}
     if options.realizations:
         changes["monte_carlo.realizations"] = options.realizations
     if options.end_time:
         changes["solver.end_time"] = options.end_time
-    change_keys(groups, changes)
     name = "long" if settle == 0 else f"settle_{settle:g}"
     namelist = scratch / f"{name}.nml"
-    namelist.write_text(namelist_text(groups))
+    write_changed(options.case, changes, namelist)
     command = [options.executable, namelist, "--output", scratch / name]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    if options.ranks > 1:
+        command = on_ranks(options.ranks, command, options.mpiexec)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
     with h5py.File(scratch / name / "ensemble.h5") as file:
         cases = {label: {c: group[c][:] for c in COLUMNS} for label, group in file["cases"].items()}
     rows = {c: np.concatenate([case[c] for case in cases.values()]) for c in COLUMNS}
