@@ -28,8 +28,8 @@ def on_ranks(ranks, command, mpiexec="mpirun"):
 
 
 def timed_run(command, directory, ranks, mpiexec="mpirun"):
-    """Runs sgimp in `directory` from the start, under mpirun on one rank too: wall time from mpirun to its end in s, and
-    the wall times of the members by case, {label: [members]}."""
+    """Runs sgimp in `directory` from the start, under mpirun on one rank too. Wall time from mpirun to its end in s,
+    and the wall times of the members by case, {label: [members]}."""
     command = on_ranks(ranks, [*command, "--output", directory, "--overwrite"], mpiexec)
     start = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
