@@ -23,7 +23,8 @@ The statistics are the mean runout and P(runout > S), S being the mean of the fi
   that without bias and that with the largest of the interval. Where it is resolved, the squared bias is the squared
   difference less the variance of the difference.
 - The bias of the finest ensemble is unknown and not counted: errors are against an infinite ensemble of the finest
-  cells. As printed, the two finest tell its order of magnitude: first order in h leaves as much again as they differ.
+  cells. Its order of magnitude is guessed from the two finest: of first order in h, halving h leaves as much again as
+  they differ. Errors below that guess are printed with an asterisk.
 
 What the cell size changes is mechanics and field together. The field is sampled at the points, h/2 apart with 2 x 2
 points a cell, whatever the scale of fluctuation (0.2 m in the paper): at h = 0.5 m neighbours are 0.25 m apart and next
@@ -44,7 +45,7 @@ import math
 import os
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +64,7 @@ from runner import read_namelist, write_changed
 
 COLUMNS = ("statistic", "cell_size", "members", "core_hours", "error_least", "error", "error_most")
 LEAST_MEMBERS = 10
-COUNTS = [n * 10**power for power in range(1, 6) for n in (1, 2, 5)]
+COUNTS = [*(n * 10**power for power in range(1, 5) for n in (1, 2, 5)), 100000]
 COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#7A6A00", "#56B4E9")
 
 
@@ -232,13 +233,20 @@ def tell_ensembles(options, ensembles, means, shares, threshold):
             f"| {own.sd:.4f} ({own.sd_low:.4f} to {own.sd_high:.4f}) "
             f"| {share.value:.3f} ({share.low:.3f} to {share.high:.3f}) | {told_bias(share)} |"
         )
-    other, finest = means[-2:]
-    moves_on = -other.bias.mean / (other.cell / finest.cell - 1)
+    guess = guessed_bias(means)
     print(
-        f"\nThe cells of {finest.cell:g} m have a bias too, which no error here counts: at first order in the cell "
-        f"size the mean moves on by {moves_on:+.3f} m (from the two finest; their "
-        f"difference is {'' if other.is_resolved else 'not '}resolved)."
+        f"\nThe cells of {means[-1].cell:g} m have a bias too, which no error here counts. From the two finest, at "
+        f"first order in the cell size: {guess.mean:+.3f} m ({guess.low:+.3f} to {guess.high:+.3f}) of the mean, "
+        f"{guessed_bias(shares).mean:+.2f} of P. *: error below that"
     )
+
+
+def guessed_bias(estimates):
+    """Bias of the finest ensemble, from the two finest, at first order in the cell size, as a Difference."""
+    other, finest = estimates[-2:]
+    factor = 1 / (other.cell / finest.cell - 1)
+    low, mean, high = (factor * value for value in (other.bias.low, other.bias.mean, other.bias.high))
+    return replace(other.bias, mean=mean, low=low, high=high)
 
 
 def best(estimates, hours, which):
@@ -247,7 +255,7 @@ def best(estimates, hours, which):
     return min(able, key=lambda row: row[2][which], default=None)
 
 
-def told_range(errors):
+def told_error(errors):
     """The likely error, else between which ones it is."""
     least, likely, most = errors
     return f"{least:.2g} to {most:.2g}" if math.isnan(likely) else f"{likely:.2g}"
@@ -255,16 +263,29 @@ def told_range(errors):
 
 def tell_advice(options, estimates, unit):
     """The best cell size for some numbers of core-hours."""
-    hours = options.hours or [h * 10.0**power for power in range(-3, 4) for h in (1, 3)]
+    hours = options.hours or [h * 10.0**power for power in range(-3, 3) for h in (1, 3)]
     print(
         f"\n{estimates[0].name}{unit}\n\n| with core-hours | best cell, m | members | error "
-        "| if biases are as small as they can be | members | error |\n|---|---|---|---|---|---|---|"
+        "| if biases are as small as they can be | members | error, least |\n|---|---|---|---|---|---|---|"
     )
+    guess = abs(guessed_bias(estimates).mean)
     for budget in hours:
         if (safe := best(estimates, budget, 2)) is None:
             continue
-        entries = [f"{e.cell:g} | {n} | {told_range(errors)}" for e, n, errors in (safe, best(estimates, budget, 0))]
-        print(f"| {budget:g} | {entries[0]} | " + ("the same | | |" if entries[0] == entries[1] else f"{entries[1]} |"))
+        hopeful = best(estimates, budget, 0)
+        mark = "*" if safe[2][2] < guess else ""
+        entry = f"{safe[0].cell:g} | {safe[1]} | {told_error(safe[2])}{mark}"
+        other = (
+            f"{hopeful[0].cell:g} | {hopeful[1]} | {hopeful[2][0]:.2g}" if hopeful[0] is not safe[0] else "the same | |"
+        )
+        print(f"| {budget:g} | {entry} | {other} |")
+
+
+def told(value):
+    """A value as the file has it: six digits, nothing for what is not resolved."""
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.6g}"
+    return value
 
 
 def rows_of(estimates):
@@ -294,11 +315,13 @@ def draw(panels, path):
             axis.fill_between(hours, errors[0], errors[2], color=colour, alpha=0.18, lw=0)
             axis.plot(hours, errors[1], ".-", color=colour, ms=4, lw=1.3)
             axis.plot([], [], "o-", color=colour, ms=4, label=f"{cell:g} m")
-        for name, style in (("error_most", "-"), ("error_least", ":")):
+        for name, mark, label in (
+            ("error_most", "o", "best by the largest error"),
+            ("error_least", "s", "best by the least error"),
+        ):
             front = pareto_front(rows, lambda row: row["core_hours"], lambda row, name=name: row[name])
-            label = {"error_most": "best, largest error", "error_least": "best, least error"}[name]
             x, y = ([row[key] for row in front] for key in ("core_hours", name))
-            axis.plot(x, y, style, color="black", lw=1.0, marker="o", ms=6, mfc="none", mew=0.7, label=label)
+            axis.plot(x, y, ":", color="black", lw=0.7, marker=mark, ms=8, mfc="none", mew=0.7, label=label)
         axis.set(xscale="log", yscale="log", title=title, xlabel="core-hours", ylabel="error")
         axis.grid(True, which="major", color="#E4E9ED")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
@@ -330,7 +353,7 @@ def main():
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         for row in (row for _, rows in panels for row in rows):
-            writer.writerow({key: "" if value != value else value for key, value in row.items()})
+            writer.writerow({key: told(value) for key, value in row.items()})
     draw(panels, options.out / "statistic.png")
 
 
