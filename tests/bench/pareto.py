@@ -217,8 +217,24 @@ def draw(rows, path):
         axis.step([r["cpu"] for r in front], [r["error"] for r in front], where="post", color="black", lw=1)
         axis.set(xscale="log", yscale="log", title=scene, xlabel="CPU time (s)", ylabel="error (1)")
         axis.set_ylim(top=2.0)
-    figure.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    title = "filled: double precision, open: single" if any(r["precision"] == "single" for r in rows) else None
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, title=title)
     figure.savefig(path, dpi=110)
+
+
+def tell_precision(rows):
+    """Single against double precision, over runs that are otherwise the same."""
+    by_setup = {key_of(row): row for row in rows}
+    pairs = [(row, by_setup.get((*key[:-1], "double"))) for key, row in by_setup.items() if key[-1] == "single"]
+    pairs = [(single, double) for single, double in pairs if double]
+    if pairs:
+        cpu, error = (np.array([single[name] / double[name] for single, double in pairs]) for name in ("cpu", "error"))
+        print(
+            f"single over double, {len(pairs)} pairs: CPU {np.median(cpu):.3f} (median; quartiles "
+            f"{np.quantile(cpu, 0.25):.3f} to {np.quantile(cpu, 0.75):.3f}), error {np.median(error):.3f} "
+            f"({error.min():.3f} to {error.max():.3f})"
+        )
 
 
 def tell(rows):
@@ -232,6 +248,7 @@ def tell(rows):
             points = f"{r['cells']} cells, {r['side']} x {r['side']}"
             setup = f"{r['weighting']} {r['scheme']}, {points}, CFL {r['cfl']}, {r['precision']}"
             print(f"{r['cpu']:9.4f} {r['error']:9.2e}  {setup}")
+        tell_precision(here)
 
 
 def main():
