@@ -32,7 +32,8 @@ to independent (exp(-2 x 0.25/0.2) = 0.08 for snx), and each stands for its 0.25
 longer scale, d coth(d/0.2) with d the spacing, for snx 0.295, 0.225, 0.206 and 0.202 m for cells of 0.5 to 0.0625 m,
 and strengths averaged over a region scatter more by the same factors, 1.47, 1.13, 1.03 and 1.01. For a user who must
 choose h, all of it is the error of h. To hold the field fixed, hold the points: 0.5 m with 8 x 8 points a cell and
-0.125 m with 2 x 2 have the same points and the same field, member by member, at nearly the cost of the finer grid.
+0.125 m with 2 x 2 have the same points and the same field, member by member; the coarser one then saves steps only, a
+quarter of the cost, not 1/64, and its points are not those of the cell size as people use it. That is not done here.
 
 Writes DIR/statistic.csv (a row for each h and N; empty where an error is not resolved) and DIR/statistic.png, and
 prints the ensembles, and for some numbers of core-hours the best cell size and N twice: for the largest the error can
