@@ -18,6 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from launch import environment, on_ranks
+from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
 from runner import read_namelist, write_changed
@@ -79,6 +80,21 @@ def print_noise(homogeneous, cell):
     print(f"noise floor, standard deviation in cells: {spread}")
 
 
+def print_cases(rows, long):
+    """Whether rest shifts the cases with a random field alike and leaves their spread as it is."""
+    masks = [rows["case"] == case for case in np.unique(rows["case"]) if case != "deterministic"]
+    if len(masks) < 2 or min(mask.sum() for mask in masks) < 3:
+        return
+    for name in RUNOUTS:
+        at_rest, after = (np.sqrt(np.mean([columns[name][mask].var() for mask in masks])) for columns in (rows, long))
+        change = long[name] - rows[name]
+        odds = stats.f_oneway(*(change[mask] for mask in masks)).pvalue
+        print(
+            f"{name}: standard deviation within cases at rest {at_rest / after:.3f} of that afterwards; changes of "
+            f"{len(masks)} cases differ with p = {odds:.2f} (F test)"
+        )
+
+
 def compare(settle, rows, long, cell):
     """Prints one settle value; returns the largest and the mean change of each runout, in cells."""
     rested = rows["settled"] == 1
@@ -99,6 +115,7 @@ def compare(settle, rows, long, cell):
             f"| `{name}` | {mean[name]:+.3f} | {min(means):+.3f} | {max(means):+.3f} | {ninety_nine:.3f} "
             f"| {largest[name]:.3f} |"
         )
+    print_cases(rows, long)
     if not rested.all():
         sys.exit("not all members came to rest: give a longer --end-time")
     return largest, mean
