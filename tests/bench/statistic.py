@@ -24,7 +24,8 @@ The statistics are the mean runout and P(runout > S), S being the mean of the fi
   difference less the variance of the difference.
 - The bias of the finest ensemble is unknown and not counted: errors are against an infinite ensemble of the finest
   cells. Its order of magnitude is guessed from the two finest: of first order in h, halving h leaves as much again as
-  they differ. Errors below that guess are printed with an asterisk.
+  they differ. Errors below that guess are printed with an asterisk. With three sizes in a constant ratio, the order
+  at which they change is told; where it is above 1, the guess is too large.
 
 What the cell size changes is mechanics and field together. The field is sampled at the points, h/2 apart with 2 x 2
 points a cell, whatever the scale of fluctuation (0.2 m in the paper): at h = 0.5 m neighbours are 0.25 m apart and next
@@ -240,6 +241,11 @@ def tell_ensembles(options, ensembles, means, shares, threshold):
         f"first order in the cell size: {guess.mean:+.3f} m ({guess.low:+.3f} to {guess.high:+.3f}) of the mean, "
         f"{guessed_bias(shares).mean:+.2f} of P. *: error below that"
     )
+    if len(means) > 2:
+        sizes, values = ([getattr(mean, name) for mean in means[-3:]] for name in ("cell", "value"))
+        (one, two), (above, below) = np.abs(np.diff(values)), (sizes[0] / sizes[1], sizes[1] / sizes[2])
+        if math.isclose(above, below) and two > 0.0:
+            print(f"Order at which the means of the three finest change: {math.log(one / two) / math.log(above):.1f}")
 
 
 def guessed_bias(estimates):
