@@ -171,6 +171,15 @@ def welch_difference(first, second, confidence: float = CONFIDENCE) -> Differenc
     )
 
 
+def proportion_difference(first: Proportion, second: Proportion) -> Difference:
+    """Difference of two independent shares, with the interval that Newcombe (1998, method 10) makes
+    of their Wilson intervals; no p value."""
+    mean = first.value - second.value
+    below = np.hypot(first.value - first.low, second.high - second.value)
+    above = np.hypot(first.high - first.value, second.value - second.low)
+    return Difference(first.n + second.n, mean, float(mean - below), float(mean + above), np.nan)
+
+
 def holm(p_values) -> np.ndarray:
     """p values adjusted for the number of comparisons (Holm 1979); NaN stays and is not counted."""
     p = np.asarray(p_values, dtype=float)

@@ -12,6 +12,7 @@ from sgimp_post.statistics import (
     holm,
     paired_difference,
     probability_above,
+    proportion_difference,
     running,
     welch_difference,
     wilson,
@@ -31,6 +32,20 @@ def test_wilson_is_that_of_scipy(n):
         got = wilson(count, n)
         assert (got.low, got.high) == pytest.approx((expected.low, expected.high), abs=1e-12)
         assert 0.0 <= got.low <= got.value <= got.high <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "low", "high"),
+    [
+        ((56, 70), (48, 80), 0.0524, 0.3339),
+        ((9, 10), (3, 10), 0.1705, 0.8090),
+        ((10, 10), (0, 10), 0.6075, 1.0),
+    ],
+)
+def test_difference_of_shares_against_the_table(first, second, low, high):
+    """Newcombe (1998), Statistics in Medicine 17, 873-890, table II, method 10."""
+    got = proportion_difference(wilson(*first), wilson(*second))
+    assert (got.low, got.high) == pytest.approx((low, high), abs=6e-5)
 
 
 def test_wilson_covers_a_share_of_sixty_percent():

@@ -8,14 +8,11 @@ x (time of a member alone) / (time of a member beside others).
 """
 
 import argparse
-import subprocess
 import tempfile
-import time
 from pathlib import Path
 
-import h5py
 import numpy as np
-from launch import environment, on_ranks
+from launch import timed_run
 
 
 def arguments():
@@ -30,14 +27,9 @@ def arguments():
 
 
 def run(options, ranks, directory):
-    """Wall time of a run, from mpirun to its end, and the sum of its members' times, in s."""
-    command = [options.executable, options.case, "--output", directory, "--overwrite"]
-    command = on_ranks(ranks, command, options.mpiexec)
-    start = time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
-    wall = time.perf_counter() - start
-    with h5py.File(Path(directory) / "ensemble.h5") as file:
-        members = np.concatenate([group["seconds"][:] for group in file["cases"].values()])
+    """Wall time of a run, the sum of its members' times, in s, and their number."""
+    wall, cases = timed_run([options.executable, options.case], directory, ranks, options.mpiexec)
+    members = np.concatenate(list(cases.values()))
     return wall, members.sum(), len(members)
 
 

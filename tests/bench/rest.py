@@ -2,11 +2,11 @@
 runout still went after rest was declared, in cells, and how many steps were saved.
 
 Usage: rest.py SGIMP_EXECUTABLE CASE.nml [--settle 1e-3 1e-4] [--realizations 7] [--end-time 16] [--scratch DIR]
-               [--most runout_q995=0.5 ...]
+               [--ranks 1] [--most runout_q995=0.5 ...] [--mean runout_q995=0.1 ...]
 
-Run it again with the same --scratch and it goes on where it was stopped. --most makes it a test: exit code 1 if a
-runout of any member changes by more cells. With homogeneous members beside the random fields, the standard deviation
-of their runouts, the noise floor, is told for comparison; they are rows like the others.
+Run it again with the same --scratch and it goes on where it was stopped. --most and --mean make it a test: exit code 1
+if a runout of any member, or of all on average, changes by more cells. With homogeneous members beside the random
+fields, the standard deviation of their runouts, the noise floor, is told for comparison; they are rows like the others.
 """
 
 import argparse
@@ -17,12 +17,20 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from launch import environment, on_ranks
+from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
-from runner import change_keys, namelist_text, read_namelist
+from runner import read_namelist, write_changed
 
 RUNOUTS = ("runout_max", "runout_q99", "runout_q995", "runout_connected")
 COLUMNS = (*RUNOUTS, "status", "settled", "settle_time", "steps")
+
+
+def bound(text):
+    """What --most and --mean take."""
+    name, most = text.split("=")
+    return name, float(most)
 
 
 def arguments():
@@ -33,25 +41,28 @@ def arguments():
     parser.add_argument("--settle", type=float, nargs="+", help="shares of the peak; as the case has it")
     parser.add_argument("--realizations", type=int, help="of each case of the study; as the case has it")
     parser.add_argument("--end-time", type=float, help="of all runs, in s; as the case has it")
+    parser.add_argument("--ranks", type=int, default=1)
+    parser.add_argument("--mpiexec", default="mpirun")
     parser.add_argument("--scratch", type=Path, help="keeps the runs here")
-    parser.add_argument("--most", nargs="*", default=[], metavar="RUNOUT=CELLS")
+    parser.add_argument("--most", type=bound, nargs="*", default=[], metavar="RUNOUT=CELLS")
+    parser.add_argument("--mean", type=bound, nargs="*", default=[], metavar="RUNOUT=CELLS")
     return parser.parse_args()
 
 
 def run(options, scratch, settle):
     """Columns of all members of the case, [members], by name; nominal is where the case is homogeneous."""
-    groups = read_namelist(options.case)
     changes = {"solver.settle": settle, "output.snapshot_members": None, "output.snapshot_interval": None}
     if options.realizations:
         changes["monte_carlo.realizations"] = options.realizations
     if options.end_time:
         changes["solver.end_time"] = options.end_time
-    change_keys(groups, changes)
     name = "long" if settle == 0 else f"settle_{settle:g}"
     namelist = scratch / f"{name}.nml"
-    namelist.write_text(namelist_text(groups))
+    write_changed(options.case, changes, namelist)
     command = [options.executable, namelist, "--output", scratch / name]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    if options.ranks > 1:
+        command = on_ranks(options.ranks, command, options.mpiexec)
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
     with h5py.File(scratch / name / "ensemble.h5") as file:
         cases = {label: {c: group[c][:] for c in COLUMNS} for label, group in file["cases"].items()}
     rows = {c: np.concatenate([case[c] for case in cases.values()]) for c in COLUMNS}
@@ -69,8 +80,23 @@ def print_noise(homogeneous, cell):
     print(f"noise floor, standard deviation in cells: {spread}")
 
 
+def print_cases(rows, long):
+    """Whether rest shifts the cases with a random field alike and leaves their spread as it is."""
+    masks = [rows["case"] == case for case in np.unique(rows["case"]) if case != "deterministic"]
+    if len(masks) < 2 or min(mask.sum() for mask in masks) < 3:
+        return
+    for name in RUNOUTS:
+        at_rest, after = (np.sqrt(np.mean([columns[name][mask].var() for mask in masks])) for columns in (rows, long))
+        change = long[name] - rows[name]
+        odds = stats.f_oneway(*(change[mask] for mask in masks)).pvalue
+        print(
+            f"{name}: standard deviation within cases at rest {at_rest / after:.3f} of that afterwards; changes of "
+            f"{len(masks)} cases differ with p = {odds:.2f} (F test)"
+        )
+
+
 def compare(settle, rows, long, cell):
-    """Prints one settle value; returns the largest change of each runout, in cells."""
+    """Prints one settle value; returns the largest and the mean change of each runout, in cells."""
     rested = rows["settled"] == 1
     saved = 1 - rows["steps"].sum() / long["steps"].sum()
     print(
@@ -79,25 +105,25 @@ def compare(settle, rows, long, cell):
         f"{100 * saved:.1f} % saved"
     )
     print("| change after rest, in cells | mean | of a case, from | to | 99 % | largest |\n|---|---|---|---|---|---|")
-    largest = {}
+    largest, mean = {}, {}
     for name in RUNOUTS:
         change = (long[name] - rows[name]) / cell
-        largest[name] = np.abs(change).max()
+        largest[name], mean[name] = np.abs(change).max(), change.mean()
         ninety_nine = np.quantile(np.abs(change), 0.99)
         means = [change[rows["case"] == case].mean() for case in np.unique(rows["case"])]
         print(
-            f"| `{name}` | {change.mean():+.3f} | {min(means):+.3f} | {max(means):+.3f} | {ninety_nine:.3f} "
+            f"| `{name}` | {mean[name]:+.3f} | {min(means):+.3f} | {max(means):+.3f} | {ninety_nine:.3f} "
             f"| {largest[name]:.3f} |"
         )
+    print_cases(rows, long)
     if not rested.all():
         sys.exit("not all members came to rest: give a longer --end-time")
-    return largest
+    return largest, mean
 
 
 def main():
     """All settle values against the long run."""
     options = arguments()
-    bounds = {name: float(most) for name, most in (text.split("=") for text in options.most)}
     keys = {group: values for group, values in read_namelist(options.case)}
     cell = float(keys["grid"]["cell_size"])
     shares = options.settle or [float(keys["solver"]["settle"])]
@@ -110,8 +136,9 @@ def main():
     print(f"{len(long['status'])} members, to {long['steps'].mean():.0f} steps each without a rest")
     print_noise(homogeneous, cell)
     for settle, rows in runs.items():
-        largest = compare(settle, rows, long, cell)
-        beyond += [f"{name} {largest[name]:.3f} > {most}" for name, most in bounds.items() if largest[name] > most]
+        largest, mean = compare(settle, rows, long, cell)
+        for what, values, bounds in (("largest", largest, options.most), ("mean", mean, options.mean)):
+            beyond += [f"{what} {name} {values[name]:.3f} > {most}" for name, most in bounds if values[name] > most]
     if beyond:
         sys.exit("FAILED: changes by more cells than allowed: " + ", ".join(beyond))
 

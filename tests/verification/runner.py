@@ -100,6 +100,13 @@ def namelist_text(groups):
     return "".join(f"&{name} " + ", ".join(f"{k}={v}" for k, v in keys.items()) + " /\n" for name, keys in groups)
 
 
+def write_changed(case, changes, path):
+    """The namelist `case` with changed keys (see change_keys), written to `path`."""
+    groups = read_namelist(case)
+    change_keys(groups, changes)
+    path.write_text(namelist_text(groups))
+
+
 def run_namelist(executable, namelist, directory, codes=(0,)):
     """Runs a namelist in `directory`, whatever that held; any exit code but `codes` is an error."""
     command = [executable, namelist, "--output", directory, "--overwrite"]
