@@ -11,12 +11,14 @@ module sg_particle_copy
 
 contains
 
-  !> Points of a scene, for the kernel; `to` has had none.
-  subroutine take_particles(from, to)
+  !> Points of a scene, for the kernel, which counts positions from `origin` (m).
+  subroutine take_particles(from, origin, to)
     type(shown_particles_t), intent(in) :: from
+    real(dp), intent(in) :: origin(2)
     type(particles_t), intent(out) :: to
 
     to%count = from%count
+    to%origin = origin
     allocate (to%bodies(size(from%bodies)))
     to%bodies%first = from%bodies%first
     to%bodies%last = from%bodies%last
@@ -24,12 +26,12 @@ contains
     to%bodies%width = real(from%bodies%width, wp)
     to%bodies%height = real(from%bodies%height, wp)
     to%bodies%is_measured = from%bodies%is_measured
-    to%x = real(from%x, wp)
-    to%y = real(from%y, wp)
+    to%x = real(from%x - origin(1), wp)
+    to%y = real(from%y - origin(2), wp)
     to%vx = real(from%vx, wp)
     to%vy = real(from%vy, wp)
-    to%x_start = real(from%x_start, wp)
-    to%y_start = real(from%y_start, wp)
+    to%x_start = real(from%x_start - origin(1), wp)
+    to%y_start = real(from%y_start - origin(2), wp)
     to%mass = real(from%mass, wp)
     to%volume = real(from%volume, wp)
     to%width = real(from%width, wp)
@@ -51,7 +53,7 @@ contains
     to%plastic_strain = real(from%plastic_strain, wp)
   end subroutine take_particles
 
-  !> Points of the kernel, for an observer.
+  !> Points of the kernel, for an observer, who counts positions from (0, 0).
   subroutine show_particles(from, to)
     type(particles_t), intent(in) :: from
     type(shown_particles_t), intent(out) :: to
@@ -64,12 +66,12 @@ contains
     to%bodies%width = real(from%bodies%width, dp)
     to%bodies%height = real(from%bodies%height, dp)
     to%bodies%is_measured = from%bodies%is_measured
-    to%x = real(from%x, dp)
-    to%y = real(from%y, dp)
+    to%x = real(from%x, dp) + from%origin(1)
+    to%y = real(from%y, dp) + from%origin(2)
     to%vx = real(from%vx, dp)
     to%vy = real(from%vy, dp)
-    to%x_start = real(from%x_start, dp)
-    to%y_start = real(from%y_start, dp)
+    to%x_start = real(from%x_start, dp) + from%origin(1)
+    to%y_start = real(from%y_start, dp) + from%origin(2)
     to%mass = real(from%mass, dp)
     to%volume = real(from%volume, dp)
     to%width = real(from%width, dp)

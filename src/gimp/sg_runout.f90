@@ -26,7 +26,8 @@ contains
     do body = 1, size(particles%bodies)
       associate (b => particles%bodies(body))
         if (.not. b%is_measured) cycle
-        x = max(x, real(maxval(particles%x(b%first:b%last)), dp) + 0.5_wp*b%width)
+        x = max(x, real(maxval(particles%x(b%first:b%last)), dp) + 0.5_wp*b%width &
+          + particles%origin(1))
       end associate
     end do
   end function farthest_edge
@@ -42,7 +43,7 @@ contains
     real(dp) :: total, summed
     integer :: k, s
 
-    position = pack(real(particles%x, dp), particles%is_measured())
+    position = pack(particles%origin(1) + particles%x, particles%is_measured())
     mass = pack(real(particles%mass, dp), particles%is_measured())
     order = sort_index(position)
     total = sum(mass)
@@ -72,7 +73,7 @@ contains
       if (.not. particles%bodies(body)%is_measured) cycle
       density = materials(particles%bodies(body)%material)%density
       do p = particles%bodies(body)%first, particles%bodies(body)%last
-        k = floor((particles%x(p) - x_min)/column_width) + 1
+        k = floor((particles%origin(1) + particles%x(p) - x_min)/column_width) + 1
         if (k >= 1 .and. k <= columns) total(k) = total(k) &
           + particles%mass(p)/(density*column_width)
       end do
@@ -108,9 +109,9 @@ contains
     do body = 1, size(particles%bodies)
       associate (b => particles%bodies(body))
         if (.not. b%is_measured) cycle
-        y = max(y, 0.5_wp*b%height + maxval(real(particles%y(b%first:b%last), dp), &
-                mask=particles%x(b%first:b%last) >= x_first &
-                .and. particles%x(b%first:b%last) <= x_last))
+        y = max(y, 0.5_wp*b%height + maxval(particles%origin(2) + particles%y(b%first:b%last), &
+                mask=particles%origin(1) + particles%x(b%first:b%last) >= x_first &
+                .and. particles%origin(1) + particles%x(b%first:b%last) <= x_last))
       end associate
     end do
   end function surface_height
@@ -145,7 +146,8 @@ contains
     end do
   end function elastic_energy
 
-  !> Potential energy in the field `gravity` (m/s^2) against the origin, in J/m.
+  !> Potential energy in the field `gravity` (m/s^2) against the place that positions are counted
+  !> from, in J/m.
   pure function potential_energy(particles, gravity) result(energy)
     type(particles_t), intent(in) :: particles
     real(dp), intent(in) :: gravity(2)
@@ -153,11 +155,11 @@ contains
     energy = -sum(particles%mass*(gravity(1)*particles%x + gravity(2)*particles%y))
   end function potential_energy
 
-  !> Angular momentum about the origin, in kg m/s.
+  !> Angular momentum about (0, 0), in kg m/s.
   pure function angular_momentum(particles) result(momentum)
     type(particles_t), intent(in) :: particles
     real(dp) :: momentum
-    momentum = sum(particles%mass*(real(particles%x, dp)*particles%vy &
-      - real(particles%y, dp)*particles%vx))
+    momentum = sum(particles%mass*((particles%origin(1) + particles%x)*particles%vy &
+      - (particles%origin(2) + particles%y)*particles%vx))
   end function angular_momentum
 end module sg_runout

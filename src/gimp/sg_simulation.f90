@@ -8,6 +8,7 @@ module sg_simulation
   use sg_materials, only: create_material, MODEL_NEO_HOOKEAN
   use sg_monitor, only: ABANDON, monitor_t, OUT_OF_TIME
   use sg_observer, only: blind_observer_t, history_row_t, observer_t, shown_particles_t
+  use sg_origin, only: counted_from, kernel_origin
   use sg_outcome, only: ENERGY_ERROR, FAILURE_POINT, FAILURE_STEP, FAILURE_X, FAILURE_Y, &
     FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
@@ -174,7 +175,8 @@ contains
     call solver%grid%clear()
     call solver%start()
     solver%damping = real(acos(-1.0_dp)*scene%wave_speed/(scene%extent(4) - scene%extent(3)), wp)
-    if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe)
+    if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe &
+      - solver%particles%origin(1))
     call start_clock(stage, scene, solver, clock)
     is_shown = observer%wants_ends .and. variation%last_relaxation_step < huge(1)
     if (is_shown) call show_state(solver, observer, clock)
@@ -203,6 +205,7 @@ contains
     class(observer_t), intent(in) :: observer
     type(solver_t), intent(out) :: solver
     type(shown_particles_t) :: first
+    type(config_t) :: here
     integer :: k
 
     solver%materials = [(create_material(config%materials(k)), k=1, size(config%materials))]
@@ -210,13 +213,14 @@ contains
     if (allocated(variation%friction_angle)) then
       call set_friction_angle(scene%materials, variation%material, variation%friction_angle, first)
     end if
-    call take_particles(first, solver%particles)
+    call take_particles(first, kernel_origin(config), solver%particles)
     if (observer%wants_plastic_strain) call solver%particles%track_plastic_strain()
     call solver%configure(config)
     if (config%loading%initial_stress == 'geostatic') then
       call make_admissible(solver%particles, solver%materials)
     end if
-    call solver%grid%init(config%grid, config%boundaries, variation%cell_stretch, &
+    here = counted_from(config, solver%particles%origin)
+    call solver%grid%init(here%grid, here%boundaries, variation%cell_stretch, &
       minval(solver%particles%mass))
     call solver%start()
   end subroutine prepare
@@ -272,16 +276,17 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(dp) :: margin, x_first, x_last, y_first, y_last
+    real(dp) :: margin, x_first, x_last, y_first, y_last, corner(2)
     integer :: p
     logical :: is_last
 
     margin = OUTSIDE_MARGIN*solver%grid%cell_size
-    x_first = config%grid%x_min - margin
-    x_last = config%grid%x_min + margin + &
+    corner = [config%grid%x_min, config%grid%y_min] - solver%particles%origin
+    x_first = corner(1) - margin
+    x_last = corner(1) + margin + &
       (config%grid%x_max - config%grid%x_min)*(1.0_dp + variation%cell_stretch)
-    y_first = config%grid%y_min - margin
-    y_last = config%grid%y_min + margin + &
+    y_first = corner(2) - margin
+    y_last = corner(2) + margin + &
       (config%grid%y_max - config%grid%y_min)*(1.0_dp + variation%cell_stretch)
     associate (t => solver%tally, s => solver%particles)
       if (.not. abs(t%kinetic_energy) <= huge(1.0_dp) &
@@ -366,8 +371,8 @@ contains
       outcome%reason = reason
       outcome%values(FAILURE_STEP) = clock%step
       outcome%values(FAILURE_POINT) = point
-      outcome%values(FAILURE_X) = solver%particles%x(point)
-      outcome%values(FAILURE_Y) = solver%particles%y(point)
+      outcome%values(FAILURE_X) = solver%particles%origin(1) + solver%particles%x(point)
+      outcome%values(FAILURE_Y) = solver%particles%origin(2) + solver%particles%y(point)
     end subroutine fail
   end subroutine check_step
 
@@ -444,23 +449,26 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     type(history_row_t) :: row
-    real(dp) :: front(1)
+    real(dp) :: front(1), potential
 
     associate (s => solver%particles)
       row%time = clock%time
       row%kinetic_energy = solver%tally%kinetic_energy
       row%elastic_energy = elastic_energy(s, solver%materials)
-      row%potential_energy = potential_energy(s, config%loading%gravity)
+      potential = potential_energy(s, config%loading%gravity)
+      row%potential_energy = potential - sum(real(s%mass, dp))*dot_product(config%loading%gravity, &
+        s%origin)
       row%plastic_work = solver%internal_work - (row%elastic_energy - clock%elastic_at_start)
       row%damping_work = solver%damping_work
       row%wall_work = solver%wall_work
       row%dissipated = row%plastic_work + row%damping_work + row%wall_work
-      row%energy_error = energy_imbalance(row%potential_energy, solver, clock)
+      row%energy_error = energy_imbalance(potential, solver, clock)
       row%reaction = 0.0_dp
       if (clock%step > 0) row%reaction = solver%grid%reaction(clock%time_step)
       row%momentum = [sum(real(s%mass, dp)*s%vx), sum(real(s%mass, dp)*s%vy)]
       row%angular_momentum = angular_momentum(s)
-      row%centre = [sum(real(s%mass, dp)*s%x), sum(real(s%mass, dp)*s%y)]/sum(real(s%mass, dp))
+      row%centre = s%origin + [sum(real(s%mass, dp)*s%x), sum(real(s%mass, dp)*s%y)] &
+        /sum(real(s%mass, dp))
       row%front_max = farthest_edge(s)
       front = mass_front(s, [0.995_dp])
       row%front_q995 = front(1)
@@ -589,7 +597,7 @@ contains
       v(KINETIC_ENERGY_RATIO) = solver%tally%motion_energy/max(clock%peak_energy, tiny(1.0_dp))
       right_wall = g%x_min + (g%x_max - g%x_min)*(1.0_dp + variation%cell_stretch)
       touched = scene%extent(2) < g%x_max - cell .and. v(RUNOUT_MAX) + scene%toe > right_wall - cell
-      touched = touched .or. (scene%extent(1) > g%x_min + cell .and. minval(s%x, &
+      touched = touched .or. (scene%extent(1) > g%x_min + cell .and. s%origin(1) + minval(s%x, &
         mask=s%is_measured()) < g%x_min + cell)
       v(WALL_TOUCHED) = merge(1.0_dp, 0.0_dp, touched)
       v(ENERGY_ERROR) = energy_imbalance(potential_energy(s, config%loading%gravity), solver, clock)
