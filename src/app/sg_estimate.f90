@@ -9,8 +9,9 @@ module sg_estimate
   use sg_plan, only: plan_t
   use sg_sampler, only: estimate_sampler_memory
   use sg_scene, only: build_scene, scene_t
-  use sg_simulation, only: simulate, variation_t
+  use sg_simulate, only: simulate
   use sg_text, only: text_of_duration, to_text
+  use sg_variation, only: variation_t
   implicit none
   private
 

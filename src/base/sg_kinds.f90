@@ -4,12 +4,15 @@ module sg_kinds
   implicit none
   private
 
-  public :: wp, sp, i1, i4, i8
+  public :: wp, sp, dp, i1, i4, i8
 
-  !> Working precision of state, geometry and statistics.
+  !> Working precision of state, geometry and statistics; the kernel in single precision has sp
+  !> under this name (cmake/SgimpPrecision.cmake).
   integer, parameter :: wp = real64
-  !> Storage precision of bulky output.
+  !> Single precision: bulky output, and what the kernel works with when asked to.
   integer, parameter :: sp = real32
+  !> Double precision, whatever the kernel works with.
+  integer, parameter :: dp = real64
   !> A byte.
   integer, parameter :: i1 = int8
   integer, parameter :: i4 = int32

@@ -76,7 +76,7 @@ module sg_config
   end type loading_config_t
 
   type :: solver_config_t
-    character(len=NAME_LENGTH) :: weighting, scheme, transfer, anti_locking
+    character(len=NAME_LENGTH) :: weighting, scheme, transfer, anti_locking, precision
     real(wp) :: flip
     real(wp) :: cfl
     !> Fixed time step in s, or 0: from the CFL number.

@@ -248,6 +248,8 @@ module sg_schema
     key_t('solver', 'anti_locking', KIND_WORD, default='none', choices='none cell_average', &
     meaning='Volumetric strain of a point: its own, or the mean of its cell (nearly '// &
     'incompressible behaviour)'), &
+    key_t('solver', 'precision', KIND_WORD, default='double', choices='double single', &
+    meaning='Of the numbers of points and nodes; times, energies and fields are double'), &
     key_t('solver', 'time_step', KIND_REAL, unit='s', range='(0,)', &
     meaning='Fixed time step; overrides cfl'), &
     key_t('solver', 'cfl', KIND_REAL, unit='1', default='0.4', range='(0,1.5]', &

@@ -9,8 +9,10 @@ module sg_memory
 
   !> Bytes of a cache line.
   integer, parameter :: LINE = 64
+  !> Bytes of an element.
+  integer, parameter :: ELEMENT = storage_size(1.0_wp)/8
   !> Elements to allocate beyond what is needed, so that an aligned start can be chosen.
-  integer, parameter :: ALIGNMENT_SLACK = LINE/8 - 1
+  integer, parameter :: ALIGNMENT_SLACK = LINE/ELEMENT - 1
 
 contains
 
@@ -21,6 +23,6 @@ contains
     integer(c_intptr_t) :: address
 
     address = transfer(c_loc(store(1)), address)
-    start = 1 + int(modulo(-address, int(LINE, c_intptr_t)))/8
+    start = 1 + int(modulo(-address, int(LINE, c_intptr_t)))/ELEMENT
   end function aligned_start
 end module sg_memory

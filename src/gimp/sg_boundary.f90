@@ -9,7 +9,7 @@
 !> Each condition keeps the impulse it gave (kg/s per metre) and all together the energy they took.
 module sg_boundary
   use sg_config, only: boundary_config_t, EDGE_TOLERANCE
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   implicit none
   private
 
@@ -38,7 +38,7 @@ module sg_boundary
     !> Contact: what became of the nodes of the box in the last step, one of the TOUCH_ constants.
     integer, allocatable :: touch(:, :)
     !> Momentum given to the nodes in the last step, kg/s.
-    real(wp) :: impulse(2) = 0.0_wp
+    real(dp) :: impulse(2) = 0.0_dp
   contains
     procedure :: is_contact
   end type condition_t
@@ -49,7 +49,7 @@ contains
   !> and the lower wall. Nothing is held by a free one.
   pure function create_wall(name, friction, box, normal, sign) result(wall)
     character(len=*), intent(in) :: name
-    real(wp), intent(in) :: friction
+    real(dp), intent(in) :: friction
     integer, intent(in) :: box(4), normal
     real(wp), intent(in) :: sign
     type(condition_t) :: wall
@@ -64,7 +64,7 @@ contains
       wall%held(normal) = .true.
     case ('frictional')
       wall%kind = KIND_CONTACT
-      wall%friction = friction
+      wall%friction = real(friction, wp)
       allocate (wall%touch(box(1):box(2), box(3):box(4)))
       wall%touch = TOUCH_NONE
     case default ! free: no node
@@ -83,7 +83,7 @@ contains
   !> 0) in m. A node that is outside by less than EDGE_TOLERANCE of a cell counts as inside.
   pure function create_prescribed(config, origin, cell_size) result(condition)
     type(boundary_config_t), intent(in) :: config
-    real(wp), intent(in) :: origin(2), cell_size
+    real(dp), intent(in) :: origin(2), cell_size
     type(condition_t) :: condition
 
     condition%is_prescribed = .true.
@@ -92,7 +92,7 @@ contains
       ceiling((config%y_min - origin(2))/cell_size - EDGE_TOLERANCE), &
       floor((config%y_max - origin(2))/cell_size + EDGE_TOLERANCE)]
     condition%held = [config%components /= 'y', config%components /= 'x']
-    condition%velocity = config%velocity
+    condition%velocity = real(config%velocity, wp)
   end function create_prescribed
 
   !> The nodes of `box` that lie in the window; both are i_first, i_last, j_first, j_last.
@@ -113,13 +113,13 @@ contains
     integer, intent(in) :: nx, ny
     !> Comes without a negative number in total(4); the forces, total(5:6), are not kept.
     real(wp), intent(inout) :: total(8, 0:nx, 0:ny), motion(8, 0:nx, 0:ny)
-    real(wp), intent(out) :: taken
+    real(dp), intent(out) :: taken
     real(wp) :: before(2), after(2)
     integer :: c, i, j, nodes(4)
 
     do c = 1, size(conditions)
       associate (this => conditions(c))
-        this%impulse = 0.0_wp
+        this%impulse = 0.0_dp
         nodes = overlap(this%box, window)
         do j = nodes(3), nodes(4)
           do i = nodes(1), nodes(2)
@@ -150,11 +150,11 @@ contains
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(inout) :: total(8, 0:nx, 0:ny)
     real(wp), intent(in) :: motion(8, 0:nx, 0:ny)
-    real(wp), intent(out) :: taken
+    real(dp), intent(out) :: taken
     real(wp) :: old(2), after(2)
     integer :: c, i, j, nodes(4)
 
-    taken = 0.0_wp
+    taken = 0.0_dp
     do c = 1, size(conditions)
       nodes = overlap(conditions(c)%box, window)
       do j = nodes(3), nodes(4)

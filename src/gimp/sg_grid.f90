@@ -8,8 +8,9 @@ module sg_grid
   use sg_boundary, only: apply_conditions, condition_t, create_prescribed, create_wall, &
     hold_conditions
   use sg_config, only: boundary_config_t, grid_config_t
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_memory, only: aligned_start, ALIGNMENT_SLACK
+  use sg_rounding, only: COARSENESS
   use sg_weighting, only: axis_t, NO_WALL
   implicit none
   private
@@ -21,19 +22,21 @@ module sg_grid
   !> Share of the smallest point mass below which a node counts as empty. Momentum over mass is
   !> accurate however small both are; a weight S below this means that the point reaches the node by
   !> less than the rounding of its position.
-  real(wp), parameter :: EMPTY_NODE = 1.0e-30_wp
+  real(wp), parameter :: EMPTY_NODE = 1.0e-30_wp*COARSENESS**2
 
   !> What a pass over the points finds out about them.
   type :: tally_t
     real(wp) :: x_min, x_max, y_min, y_max
-    !> Kinetic energy in J/m, largest speed squared and largest wave speed squared in (m/s)^2.
-    real(wp) :: kinetic_energy, speed_squared, wave_squared
+    !> Largest speed squared and largest wave speed squared in (m/s)^2.
+    real(wp) :: speed_squared, wave_squared
+    !> Kinetic energy in J/m.
+    real(dp) :: kinetic_energy
     !> Kinetic energy of the motion of the points, with the velocities they are moved with, J/m. A
     !> point can keep a velocity that the grid does not see; it moves nothing, and so does not count
     !> when rest is looked for.
-    real(wp) :: motion_energy
+    real(dp) :: motion_energy
     !> Work of the stresses in this step, J/m.
-    real(wp) :: internal_work
+    real(dp) :: internal_work
   contains
     procedure :: reset => reset_tally
   end type tally_t
@@ -41,7 +44,7 @@ module sg_grid
   !> Energy that left the nodes in a step, J/m.
   type :: losses_t
     !> To the damping force, and to walls and prescribed velocities (negative: they put some in).
-    real(wp) :: damping = 0.0_wp, walls = 0.0_wp
+    real(dp) :: damping = 0.0_dp, walls = 0.0_dp
   end type losses_t
 
   type :: grid_t
@@ -96,15 +99,18 @@ contains
     class(grid_t), intent(out) :: this
     type(grid_config_t), intent(in) :: config
     type(boundary_config_t), intent(in) :: boundaries(:)
-    real(wp), intent(in) :: stretch, least_point_mass
+    real(dp), intent(in) :: stretch
+    real(wp), intent(in) :: least_point_mass
+    real(dp) :: cell
     type(condition_t) :: walls(4)
     logical :: may_lift(4)
     integer :: nodes, k
 
-    this%cell_size = config%cell_size*(1.0_wp + stretch)
-    this%x = create_axis(config%x_min, config%x_max, config%cell_size, this%cell_size, &
+    cell = config%cell_size*(1.0_dp + stretch)
+    this%cell_size = real(cell, wp)
+    this%x = create_axis(config%x_min, config%x_max, config%cell_size, cell, &
       config%left, config%right)
-    this%y = create_axis(config%y_min, config%y_max, config%cell_size, this%cell_size, &
+    this%y = create_axis(config%y_min, config%y_max, config%cell_size, cell, &
       config%bottom, config%top)
     associate (nx => this%x%last, ny => this%y%last)
       walls(1) = create_wall(config%left, config%left_friction, [0, GHOST, 0, ny], 1, 1.0_wp)
@@ -115,8 +121,8 @@ contains
       may_lift = walls%is_contact()
       this%conditions = [pack(walls, mask=.not. may_lift), pack(walls, mask=may_lift)]
       do k = 1, size(boundaries)
-        this%conditions = [this%conditions, create_prescribed(boundaries(k), [this%x%origin, &
-          this%y%origin], this%cell_size)]
+        this%conditions = [this%conditions, create_prescribed(boundaries(k), [config%x_min, &
+          config%y_min] - GHOST*cell, cell)]
       end do
       this%window = [0, nx, 0, ny]
       nodes = (nx + 1)*(ny + 1)
@@ -133,12 +139,12 @@ contains
   !> Nodes from `low` to `high` with the ghost layers. `nominal` is the cell of the case file, which
   !> says how many there are, `cell` the one in use, both in m.
   pure function create_axis(low, high, nominal, cell, first_wall, last_wall) result(axis)
-    real(wp), intent(in) :: low, high, nominal, cell
+    real(dp), intent(in) :: low, high, nominal, cell
     character(len=*), intent(in) :: first_wall, last_wall
     type(axis_t) :: axis
 
-    axis%origin = low - GHOST*cell
-    axis%inverse_cell = 1.0_wp/cell
+    axis%origin = real(low - GHOST*cell, wp)
+    axis%inverse_cell = real(1.0_dp/cell, wp)
     axis%last = nint((high - low)/nominal) + 2*GHOST
     axis%last_base = axis%last - 2
     axis%first_wall = merge(NO_WALL, GHOST, first_wall == 'free')
@@ -192,7 +198,7 @@ contains
     real(wp), intent(in) :: least_mass, time_step, gravity(2), damping
     real(wp), intent(in) :: total(8, 0:nx, 0:ny)
     real(wp), intent(inout) :: motion(8, 0:nx, 0:ny)
-    real(wp), intent(out) :: damping_work
+    real(dp), intent(out) :: damping_work
     real(wp) :: mass, inverse_mass, vx, vy, dvx, dvy
     integer :: i, j
 
@@ -281,9 +287,9 @@ contains
   !> open_gate.
   subroutine set_gate(this, x)
     class(grid_t), intent(inout) :: this
-    real(wp), intent(in) :: x
+    real(dp), intent(in) :: x
 
-    this%conditions = [this%conditions, create_wall('roller', 0.0_wp, [nint((x - this%x%origin) &
+    this%conditions = [this%conditions, create_wall('roller', 0.0_dp, [nint((x - this%x%origin) &
       *this%x%inverse_cell), this%x%last, 0, this%y%last], 1, -1.0_wp)]
     this%has_gate = .true.
   end subroutine set_gate
@@ -298,8 +304,8 @@ contains
   !> Force of the prescribed velocities on the material in the last step, in N/m.
   pure function reaction(this, time_step) result(force)
     class(grid_t), intent(in) :: this
-    real(wp), intent(in) :: time_step
-    real(wp) :: force(2)
+    real(dp), intent(in) :: time_step
+    real(dp) :: force(2)
     integer :: c
 
     force = 0.0_wp

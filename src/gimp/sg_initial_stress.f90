@@ -1,6 +1,6 @@
 !> Stress before the first step: that of level ground under its own weight, made admissible.
 module sg_initial_stress
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_MOHR_COULOMB
   use sg_particles, only: particles_t
   use sg_sorting, only: sort_index
@@ -31,7 +31,7 @@ contains
     column = 1 + floor((particles%x - minval(particles%x))/width + 0.5_wp)
     allocate (above(maxval(column)))
     above = 0.0_wp
-    order = sort_index(-particles%y)
+    order = sort_index(-real(particles%y, dp))
     do k = 1, particles%count
       p = order(k)
       load(p) = -gravity(2)*(above(column(p)) + 0.5_wp*particles%mass(p))/width

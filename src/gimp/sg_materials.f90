@@ -1,7 +1,7 @@
 !> Materials: what a case file says of one, turned into the constants that the kernels need.
 module sg_materials
   use sg_config, only: material_config_t
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   implicit none
   private
 
@@ -16,9 +16,9 @@ module sg_materials
   integer, parameter :: MODEL_DRUCKER_PRAGER = 4
 
   !> Tension limit of a material that has none, as a multiple of its shear strength.
-  real(wp), parameter :: UNLIMITED = 1.0e12_wp
+  real(dp), parameter :: UNLIMITED = 1.0e12_dp
 
-  real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
+  real(dp), parameter :: DEGREE = acos(-1.0_dp)/180.0_dp
 
   type :: material_t
     !> One of the MODEL_ constants.
@@ -47,40 +47,42 @@ module sg_materials
 
 contains
 
-  !> Constants of a material that passed the checks of the configuration.
+  !> Constants of a material that passed the checks of the configuration, found in double precision.
   pure function create_material(config) result(material)
     type(material_config_t), intent(in) :: config
     type(material_t) :: material
+    real(dp) :: lame, shear
 
-    material%density = config%density
-    material%poisson = config%poisson
-    material%lame = config%young*config%poisson/((1.0_wp + config%poisson)*(1.0_wp &
-      - 2.0_wp*config%poisson))
-    material%shear = config%young/(2.0_wp*(1.0_wp + config%poisson))
-    material%bulk = material%lame + 2.0_wp/3.0_wp*material%shear
+    lame = config%young*config%poisson/((1.0_dp + config%poisson)*(1.0_dp - 2.0_dp*config%poisson))
+    shear = config%young/(2.0_dp*(1.0_dp + config%poisson))
+    material%density = real(config%density, wp)
+    material%poisson = real(config%poisson, wp)
+    material%lame = real(lame, wp)
+    material%shear = real(shear, wp)
+    material%bulk = real(lame + 2.0_dp/3.0_dp*shear, wp)
     select case (config%model)
     case ('mohr_coulomb')
       material%model = MODEL_MOHR_COULOMB
-      material%friction_angle = config%friction_angle
-      material%dilation_angle = config%dilation_angle
-      material%sin_dilation = sin(config%dilation_angle*DEGREE)
-      material%cohesion = config%cohesion
-      material%tension_strength = config%tension_strength
+      material%friction_angle = real(config%friction_angle, wp)
+      material%dilation_angle = real(config%dilation_angle, wp)
+      material%sin_dilation = real(sin(config%dilation_angle*DEGREE), wp)
+      material%cohesion = real(config%cohesion, wp)
+      material%tension_strength = real(config%tension_strength, wp)
       call set_softening(config, material)
     case ('tresca')
       material%model = MODEL_MOHR_COULOMB
-      material%cohesion = config%undrained_strength
-      material%tension_strength = UNLIMITED*config%undrained_strength
+      material%cohesion = real(config%undrained_strength, wp)
+      material%tension_strength = real(UNLIMITED*config%undrained_strength, wp)
     case ('drucker_prager')
       material%model = MODEL_DRUCKER_PRAGER
-      material%friction_angle = config%friction_angle
+      material%friction_angle = real(config%friction_angle, wp)
       call set_cone(config, material)
     case ('von_mises')
       ! In plane strain the out-of-plane stress settles midway, where sqrt(J2) is half the
       ! difference of the other two.
       material%model = MODEL_DRUCKER_PRAGER
-      material%k = config%undrained_strength
-      material%mean_limit = UNLIMITED*config%undrained_strength
+      material%k = real(config%undrained_strength, wp)
+      material%mean_limit = real(UNLIMITED*config%undrained_strength, wp)
     case ('neo_hookean')
       material%model = MODEL_NEO_HOOKEAN
     case default
@@ -93,18 +95,18 @@ contains
     type(material_config_t), intent(in) :: config
     type(material_t), intent(inout) :: material
 
-    material%dilation_end = config%dilation_end
+    material%dilation_end = real(config%dilation_end, wp)
     material%softens = config%softening == 'linear' .or. config%dilation_end > 0.0_wp
-    material%residual_friction_angle = config%friction_angle
-    material%residual_cohesion = config%cohesion
+    material%residual_friction_angle = real(config%friction_angle, wp)
+    material%residual_cohesion = real(config%cohesion, wp)
     ! Strength never begins to fall.
     material%softening_start = 0.5_wp*huge(1.0_wp)
     material%softening_end = huge(1.0_wp)
     if (config%softening /= 'linear') return
-    material%residual_friction_angle = config%residual_friction_angle
-    material%residual_cohesion = config%residual_cohesion
-    material%softening_start = config%softening_start
-    material%softening_end = config%softening_end
+    material%residual_friction_angle = real(config%residual_friction_angle, wp)
+    material%residual_cohesion = real(config%residual_cohesion, wp)
+    material%softening_start = real(config%softening_start, wp)
+    material%softening_end = real(config%softening_end, wp)
   end subroutine set_softening
 
   !> alpha (on I1) and k of the cone. All have their apex at I1 = 3 c cot(phi), k = 3 alpha c
@@ -119,28 +121,30 @@ contains
   pure subroutine set_cone(config, material)
     type(material_config_t), intent(in) :: config
     type(material_t), intent(inout) :: material
-    real(wp), parameter :: ROOT3 = sqrt(3.0_wp)
-    real(wp), parameter :: PI = acos(-1.0_wp)
-    real(wp) :: s, q
+    real(dp), parameter :: ROOT3 = sqrt(3.0_dp)
+    real(dp), parameter :: PI = acos(-1.0_dp)
+    real(dp) :: s, sin_dilation, flow, q
 
     s = sin(config%friction_angle*DEGREE)
-    material%sin_dilation = sin(config%dilation_angle*DEGREE)
-    material%alpha_flow = material%sin_dilation/sqrt(9.0_wp + 3.0_wp*material%sin_dilation**2)
+    sin_dilation = sin(config%dilation_angle*DEGREE)
+    flow = sin_dilation/sqrt(9.0_dp + 3.0_dp*sin_dilation**2)
     select case (config%cone)
     case ('outer')
-      q = 0.5_wp*ROOT3*(3.0_wp - s)
+      q = 0.5_dp*ROOT3*(3.0_dp - s)
     case ('inner')
-      q = 0.5_wp*ROOT3*(3.0_wp + s)
+      q = 0.5_dp*ROOT3*(3.0_dp + s)
     case ('equal_area')
-      q = sqrt(2.0_wp*ROOT3*PI*(9.0_wp - s**2))/(2.0_wp*ROOT3)
+      q = sqrt(2.0_dp*ROOT3*PI*(9.0_dp - s**2))/(2.0_dp*ROOT3)
     case ('plane_strain_associated')
-      q = sqrt(9.0_wp + 3.0_wp*s**2)
+      q = sqrt(9.0_dp + 3.0_dp*s**2)
     case default ! plane_strain
-      q = 3.0_wp*(sqrt(1.0_wp - 3.0_wp*material%alpha_flow**2) + material%alpha_flow*s)
+      q = 3.0_dp*(sqrt(1.0_dp - 3.0_dp*flow**2) + flow*s)
     end select
-    material%alpha = s/q
-    material%k = 3.0_wp*config%cohesion*cos(config%friction_angle*DEGREE)/q
-    material%mean_limit = config%tension_strength
+    material%sin_dilation = real(sin_dilation, wp)
+    material%alpha_flow = real(flow, wp)
+    material%alpha = real(s/q, wp)
+    material%k = real(3.0_dp*config%cohesion*cos(config%friction_angle*DEGREE)/q, wp)
+    material%mean_limit = real(config%tension_strength, wp)
     if (material%k < 3.0_wp*material%alpha*material%mean_limit) then
       material%mean_limit = material%k/(3.0_wp*material%alpha)
     end if
@@ -153,9 +157,11 @@ contains
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: friction_angle, cohesion
     real(wp), intent(out) :: sin_friction, cohesion_term, tension_limit
+    real(wp) :: angle
 
-    sin_friction = sin(friction_angle*DEGREE)
-    cohesion_term = 2.0_wp*cohesion*cos(friction_angle*DEGREE)
+    angle = friction_angle*real(DEGREE, wp)
+    sin_friction = sin(angle)
+    cohesion_term = 2.0_wp*cohesion*cos(angle)
     tension_limit = material%tension_strength
     ! c cot(phi) = (2 c cos(phi)) / (2 sin(phi)); without friction there is no apex.
     if (cohesion_term < 2.0_wp*sin_friction*tension_limit) then

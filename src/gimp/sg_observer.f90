@@ -2,11 +2,13 @@
 !> arrays for a test) is the observer's business. Watching never changes a time step.
 module sg_observer
   use sg_kinds, only: wp
-  use sg_particles, only: particles_t
+  use sg_particles, only: shown_particles_t => particles_t
   implicit none
   private
 
   public :: observer_t, blind_observer_t, history_row_t
+  !> Points as observers and scenes have them: in double precision.
+  public :: shown_particles_t
 
   !> One line of the history; units as in `units` of the history group: SI, per metre of thickness.
   type :: history_row_t
@@ -45,12 +47,12 @@ module sg_observer
 
     !> The points at the end of step `step`, at `time` seconds.
     subroutine note_state_interface(this, step, time, particles)
-      import :: observer_t, particles_t, wp
+      import :: observer_t, shown_particles_t, wp
       implicit none
       class(observer_t), intent(inout) :: this
       integer, intent(in) :: step
       real(wp), intent(in) :: time
-      type(particles_t), intent(in) :: particles
+      type(shown_particles_t), intent(in) :: particles
     end subroutine note_state_interface
   end interface
 
@@ -72,6 +74,6 @@ contains
     class(blind_observer_t), intent(inout) :: this
     integer, intent(in) :: step
     real(wp), intent(in) :: time
-    type(particles_t), intent(in) :: particles
+    type(shown_particles_t), intent(in) :: particles
   end subroutine ignore_state
 end module sg_observer

@@ -2,7 +2,7 @@
 !> Points of a body are consecutive, so that a loop over a body needs no look-up of its material.
 !> Plane strain: quantities are per metre of thickness. Stress is positive in tension.
 module sg_particles
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   implicit none
   private
 
@@ -23,6 +23,8 @@ module sg_particles
   type :: particles_t
     integer :: count = 0
     type(body_points_t), allocatable :: bodies(:)
+    !> Place that positions are counted from, in m.
+    real(dp) :: origin(2) = 0.0_dp
     !> Position and velocity, [count], in m and m/s.
     real(wp), allocatable :: x(:), y(:), vx(:), vy(:)
     !> Initial position, [count], in m.

@@ -3,95 +3,83 @@
 module sg_simulation
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use sg_config, only: config_t
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_initial_stress, only: make_admissible
-  use sg_materials, only: MODEL_NEO_HOOKEAN
+  use sg_materials, only: create_material, MODEL_NEO_HOOKEAN
   use sg_monitor, only: ABANDON, monitor_t, OUT_OF_TIME
-  use sg_observer, only: blind_observer_t, history_row_t, observer_t
+  use sg_observer, only: blind_observer_t, history_row_t, observer_t, shown_particles_t
+  use sg_origin, only: counted_from, kernel_origin
   use sg_outcome, only: ENERGY_ERROR, FAILURE_POINT, FAILURE_STEP, FAILURE_X, FAILURE_Y, &
     FIELD_MAX, FIELD_MEAN, FIELD_MIN, HEIGHT_MAX, HEIGHT_WALL, KINETIC_ENERGY_END, &
     KINETIC_ENERGY_RATIO, MASS_ERROR, outcome_t, RUNOUT_CONNECTED, RUNOUT_MAX, RUNOUT_Q99, &
     RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_ENERGY_CREATED, &
     STATUS_EXTREME_STRAIN, STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, &
     STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
+  use sg_particle_copy, only: show_particles, take_particles
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
   use sg_scene, only: scene_t, set_friction_angle
   use sg_solver, only: solver_t
   use sg_text, only: to_text
   use sg_timer, only: wall_seconds
+  use sg_variation, only: variation_t
   implicit none
   private
 
-  public :: simulate, variation_t
-
-  !> How a member differs from the scene. The defaults change nothing; the homogeneous members of a
-  !> study use the others for changes that mean nothing physically.
-  type :: variation_t
-    !> Factor on the CFL number or on the fixed step.
-    real(wp) :: step_factor = 1.0_wp
-    !> Relative growth of the cells about the lower left corner. Walls must stay on lines of nodes,
-    !> so the lines inside the body are shifted by stretching: by a whole cell at the toe for
-    !> cell_size/width.
-    real(wp) :: cell_stretch = 0.0_wp
-    !> Friction angles of the points of one material, in degrees; not allocated: as the material
-    !> says.
-    real(wp), allocatable :: friction_angle(:)
-    integer :: material = 0
-    !> The run ends after so many steps (the last good state of one that failed), or after so many
-    !> steps of the relaxation, which are then what the observer is shown.
-    integer :: last_step = huge(1), last_relaxation_step = huge(1)
-  end type variation_t
+  public :: simulate
 
   !> Steps between two questions to the monitor, in points moved: a few milliseconds of work.
   integer, parameter :: POINTS_PER_QUESTION = 100000
   !> A step below this share of the first one counts as collapsed.
-  real(wp), parameter :: COLLAPSED_STEP = 1.0e-4_wp
+  real(dp), parameter :: COLLAPSED_STEP = 1.0e-4_dp
   !> A point counts as lost once its centre is this share of a cell outside. At a closed wall it can
   !> come no farther than half its own width: there all nodes it reaches are held. A point without
   !> stress may sink in so far.
-  real(wp), parameter :: OUTSIDE_MARGIN = 0.51_wp
+  real(dp), parameter :: OUTSIDE_MARGIN = 0.51_dp
   !> A speed this many times above all that the scene can explain (wave speed, fall through the
   !> domain, initial speed) counts as runaway.
-  real(wp), parameter :: RUNAWAY_FACTOR = 10.0_wp
+  real(dp), parameter :: RUNAWAY_FACTOR = 10.0_dp
   !> Steps between two looks at the ledger of energy, at the most, and at the volumes of points.
   integer, parameter :: STEPS_PER_LEDGER = 16, STEPS_PER_STRAIN = 64
   !> Share of created energy at which a run has failed, above the least energy since the start.
   !> What is stable creates 1 to 2 % (tests/verification/conservation.py); what the half step
   !> between stress and velocity misreads, and stress in rate form gains, comes on top.
-  real(wp), parameter :: MOST_CREATED = 0.05_wp
-  !> Energies are known to this share of the potential energy and of modulus times volume.
-  real(wp), parameter :: ENERGY_ROUNDING = 1.0e-12_wp
+  real(dp), parameter :: MOST_CREATED = 0.05_dp
+  !> Energies are known to this share of the potential energy and of modulus times volume. In single
+  !> precision places and strains are rounded by half a unit in each of some ten thousand steps, one
+  !> way or the other: a hundred roundings.
+  real(dp), parameter :: ENERGY_ROUNDING = merge(1.0e-12_dp, real(100.0_wp*epsilon(1.0_wp), dp), &
+    wp == dp)
   !> Volume of a point under stress, over that at its start, beyond which a run has failed.
-  real(wp), parameter :: LEAST_VOLUME = 0.05_wp, LARGEST_VOLUME = 1.0_wp/LEAST_VOLUME
+  real(dp), parameter :: LEAST_VOLUME = 0.05_dp, LARGEST_VOLUME = 1.0_dp/LEAST_VOLUME
   !> "Stays below": for half a fundamental period of the body, 2 H/c, in which the kinetic energy of
   !> an elastic oscillation goes through its whole cycle: turning points do not pass for rest.
-  real(wp), parameter :: SETTLE_PERIODS = 0.5_wp
+  real(dp), parameter :: SETTLE_PERIODS = 0.5_dp
   !> Nor does a grain that slides on alone, too small to be seen in the kinetic energy: at rest the
   !> farthest point advances slower than this share of the speed of a fall through half a cell.
   !> Friction mu stops that within a 200th of a cell/mu.
-  real(wp), parameter :: STILL = 0.1_wp
+  real(dp), parameter :: STILL = 0.1_dp
   !> Share of the peak of kinetic energy at which a relaxation ends, at the least.
-  real(wp), parameter :: RELAXED = 1.0e-6_wp
+  real(dp), parameter :: RELAXED = 1.0e-6_dp
 
   !> The clock of a simulation and what it remembers of the past.
   type :: clock_t
     integer :: step = 0
     !> Step that the observer was last shown.
     integer :: shown_step = -1
-    real(wp) :: time = 0.0_wp, time_step = 0.0_wp
-    real(wp) :: peak_energy = 0.0_wp, speed_limit = 0.0_wp
-    real(wp) :: calm_since = 0.0_wp, calm_needed = 0.0_wp
+    real(dp) :: time = 0.0_dp, time_step = 0.0_dp
+    real(dp) :: peak_energy = 0.0_dp, speed_limit = 0.0_dp
+    real(dp) :: calm_since = 0.0_dp, calm_needed = 0.0_dp
     !> Farthest point when the calm began, in m; the speed below which it counts as still, in m/s.
-    real(wp) :: calm_front = 0.0_wp, still_speed = 0.0_wp
-    real(wp) :: next_history = 0.0_wp, next_snapshot = 0.0_wp
-    real(wp) :: energy_at_start = 0.0_wp, potential_at_start = 0.0_wp, elastic_at_start = 0.0_wp
+    real(dp) :: calm_front = 0.0_dp, still_speed = 0.0_dp
+    real(dp) :: next_history = 0.0_dp, next_snapshot = 0.0_dp
+    real(dp) :: energy_at_start = 0.0_dp, potential_at_start = 0.0_dp, elastic_at_start = 0.0_dp
     !> Of the ledger, J/m: work of walls (taken) and body forces at the last look, what they gave
     !> between looks, and the least energy so far, with what damping took, less what they gave.
-    real(wp) :: seen_walls = 0.0_wp, seen_forces = 0.0_wp, given = 0.0_wp, least_energy = 0.0_wp
+    real(dp) :: seen_walls = 0.0_dp, seen_forces = 0.0_dp, given = 0.0_dp, least_energy = 0.0_dp
     !> Rise of the kinetic energy after which the ledger is looked at at once, and the energy that
     !> it is counted from: the least since the last look, J/m.
-    real(wp) :: notable_rise = 0.0_wp, least_kinetic = 0.0_wp
+    real(dp) :: notable_rise = 0.0_dp, least_kinetic = 0.0_dp
     logical :: settled = .false.
   end type clock_t
 
@@ -109,14 +97,14 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(solver_t) :: solver
     type(clock_t) :: clock
-    real(wp) :: started
+    real(dp) :: started
 
     started = wall_seconds()
     call prepare(config, scene, variation, observer, solver)
     if (config%loading%relaxation /= 'none') call relax(config, scene, variation, monitor, &
       observer, solver, outcome)
     if (outcome%status /= STATUS_OK .or. variation%last_relaxation_step < huge(1)) then
-      outcome%values(STEPS) = 0.0_wp
+      outcome%values(STEPS) = 0.0_dp
       return
     end if
     call start_clock(config, scene, solver, clock)
@@ -186,8 +174,9 @@ contains
     solver%particles%vy = 0.0_wp
     call solver%grid%clear()
     call solver%start()
-    solver%damping = acos(-1.0_wp)*scene%wave_speed/(scene%extent(4) - scene%extent(3))
-    if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe)
+    solver%damping = real(acos(-1.0_dp)*scene%wave_speed/(scene%extent(4) - scene%extent(3)), wp)
+    if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe &
+      - solver%particles%origin(1))
     call start_clock(stage, scene, solver, clock)
     is_shown = observer%wants_ends .and. variation%last_relaxation_step < huge(1)
     if (is_shown) call show_state(solver, observer, clock)
@@ -199,7 +188,7 @@ contains
       return
     end if
     call solver%grid%open_gate()
-    solver%damping = config%loading%damping
+    solver%damping = real(config%loading%damping, wp)
     solver%particles%vx = vx
     solver%particles%vy = vy
     solver%particles%plastic_strain = 0.0_wp
@@ -215,19 +204,23 @@ contains
     type(variation_t), intent(in) :: variation
     class(observer_t), intent(in) :: observer
     type(solver_t), intent(out) :: solver
+    type(shown_particles_t) :: first
+    type(config_t) :: here
+    integer :: k
 
-    solver%materials = scene%materials
-    solver%particles = scene%particles
-    if (observer%wants_plastic_strain) call solver%particles%track_plastic_strain()
+    solver%materials = [(create_material(config%materials(k)), k=1, size(config%materials))]
+    first = scene%particles
     if (allocated(variation%friction_angle)) then
-      call set_friction_angle(solver%materials, variation%material, variation%friction_angle, &
-        solver%particles)
+      call set_friction_angle(scene%materials, variation%material, variation%friction_angle, first)
     end if
+    call take_particles(first, kernel_origin(config), solver%particles)
+    if (observer%wants_plastic_strain) call solver%particles%track_plastic_strain()
     call solver%configure(config)
     if (config%loading%initial_stress == 'geostatic') then
       call make_admissible(solver%particles, solver%materials)
     end if
-    call solver%grid%init(config%grid, config%boundaries, variation%cell_stretch, &
+    here = counted_from(config, solver%particles%origin)
+    call solver%grid%init(here%grid, here%boundaries, variation%cell_stretch, &
       minval(solver%particles%mass))
     call solver%start()
   end subroutine prepare
@@ -237,16 +230,16 @@ contains
     type(scene_t), intent(in) :: scene
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
-    real(wp) :: fall
+    real(dp) :: fall
 
     clock%peak_energy = solver%tally%kinetic_energy ! at the start both are the same
-    clock%calm_needed = SETTLE_PERIODS*4.0_wp*max(scene%extent(2) - scene%extent(1), &
+    clock%calm_needed = SETTLE_PERIODS*4.0_dp*max(scene%extent(2) - scene%extent(1), &
       scene%extent(4) - scene%extent(3))/scene%wave_speed
     clock%calm_front = solver%tally%x_max
     clock%still_speed = STILL*sqrt(norm2(config%loading%gravity)*config%grid%cell_size)
     fall = norm2(config%loading%gravity) &
       *(config%grid%x_max - config%grid%x_min + config%grid%y_max - config%grid%y_min)
-    clock%speed_limit = RUNAWAY_FACTOR*(scene%wave_speed + scene%speed + sqrt(2.0_wp*fall))
+    clock%speed_limit = RUNAWAY_FACTOR*(scene%wave_speed + scene%speed + sqrt(2.0_dp*fall))
     clock%potential_at_start = potential_energy(solver%particles, config%loading%gravity)
     clock%energy_at_start = solver%tally%kinetic_energy + clock%potential_at_start
     clock%elastic_at_start = elastic_energy(solver%particles, solver%materials)
@@ -260,15 +253,15 @@ contains
     type(variation_t), intent(in) :: variation
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
-    real(wp) :: time_step
+    real(dp) :: time_step
 
-    if (scene%fixed_step > 0.0_wp) then
+    if (scene%fixed_step > 0.0_dp) then
       time_step = scene%fixed_step
     else
       ! Points that all float free carry no stress and have no wave speed: then that of the scene
       ! holds.
       time_step = config%solver%cfl*solver%grid%cell_size/(sqrt(solver%tally%speed_squared) &
-        + max(sqrt(solver%tally%wave_squared), 0.5_wp*scene%wave_speed))
+        + max(real(sqrt(solver%tally%wave_squared), dp), 0.5_dp*scene%wave_speed))
     end if
     time_step = min(time_step*variation%step_factor, config%solver%end_time - clock%time)
   end function next_step
@@ -283,22 +276,23 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: margin, x_first, x_last, y_first, y_last
+    real(dp) :: margin, x_first, x_last, y_first, y_last, corner(2)
     integer :: p
     logical :: is_last
 
     margin = OUTSIDE_MARGIN*solver%grid%cell_size
-    x_first = config%grid%x_min - margin
-    x_last = config%grid%x_min + margin + &
-      (config%grid%x_max - config%grid%x_min)*(1.0_wp + variation%cell_stretch)
-    y_first = config%grid%y_min - margin
-    y_last = config%grid%y_min + margin + &
-      (config%grid%y_max - config%grid%y_min)*(1.0_wp + variation%cell_stretch)
+    corner = [config%grid%x_min, config%grid%y_min] - solver%particles%origin
+    x_first = corner(1) - margin
+    x_last = corner(1) + margin + &
+      (config%grid%x_max - config%grid%x_min)*(1.0_dp + variation%cell_stretch)
+    y_first = corner(2) - margin
+    y_last = corner(2) + margin + &
+      (config%grid%y_max - config%grid%y_min)*(1.0_dp + variation%cell_stretch)
     associate (t => solver%tally, s => solver%particles)
-      if (.not. abs(t%kinetic_energy) <= huge(1.0_wp) &
-        .or. .not. abs(t%internal_work) <= huge(1.0_wp)) then
+      if (.not. abs(t%kinetic_energy) <= huge(1.0_dp) &
+        .or. .not. abs(t%internal_work) <= huge(1.0_dp)) then
         p = minloc(merge(1, 0, abs(s%vx + s%vy + s%sxx + s%syy + s%szz &
-          + s%sxy) <= huge(1.0_wp)), dim=1)
+          + s%sxy) <= huge(1.0_dp)), dim=1)
         call fail(STATUS_NOT_FINITE, p, &
           'velocity or stress is not a finite number: the time step is too long or '// &
                   'the material too soft for its load')
@@ -310,8 +304,8 @@ contains
           'point left the grid: make the grid larger or close the wall')
       else if (t%speed_squared > clock%speed_limit**2) then
         p = maxloc(s%vx**2 + s%vy**2, dim=1)
-        call fail(STATUS_RUNAWAY, p, 'speed of '//to_text(sqrt(t%speed_squared), &
-          4)//' m/s is above all that the '// &
+        call fail(STATUS_RUNAWAY, p, 'speed of '//to_text(real(sqrt(t%speed_squared), &
+          dp), 4)//' m/s is above all that the '// &
                   'scene can explain: the time step is too long')
       else if (clock%time_step < COLLAPSED_STEP*scene%first_step &
         .and. clock%time < config%solver%end_time) then
@@ -333,11 +327,11 @@ contains
     !> value so far by more than walls and body forces gave. (What walls take is not counted on:
     !> they take kinetic energy of the grid, the points may have lost less.)
     subroutine check_ledger()
-      real(wp) :: potential, energy, created, scale, rounding, most
+      real(dp) :: potential, energy, created, scale, rounding, most
 
       potential = potential_energy(solver%particles, config%loading%gravity)
-      clock%given = clock%given + max(clock%seen_walls - solver%wall_work, 0.0_wp) &
-        + max(solver%force_work - clock%seen_forces, 0.0_wp)
+      clock%given = clock%given + max(clock%seen_walls - solver%wall_work, 0.0_dp) &
+        + max(solver%force_work - clock%seen_forces, 0.0_dp)
       clock%seen_walls = solver%wall_work
       clock%seen_forces = solver%force_work
       energy = solver%tally%kinetic_energy + potential + elastic_energy(solver%particles, &
@@ -360,7 +354,7 @@ contains
     !> No material here means anything once a point that carries stress has lost or gained most of
     !> its volume.
     subroutine check_strain()
-      real(wp) :: ratio
+      real(dp) :: ratio
       integer :: point
 
       call find_extreme_volume(solver, point, ratio)
@@ -377,8 +371,8 @@ contains
       outcome%reason = reason
       outcome%values(FAILURE_STEP) = clock%step
       outcome%values(FAILURE_POINT) = point
-      outcome%values(FAILURE_X) = solver%particles%x(point)
-      outcome%values(FAILURE_Y) = solver%particles%y(point)
+      outcome%values(FAILURE_X) = solver%particles%origin(1) + solver%particles%x(point)
+      outcome%values(FAILURE_Y) = solver%particles%origin(2) + solver%particles%y(point)
     end subroutine fail
   end subroutine check_step
 
@@ -388,7 +382,7 @@ contains
     type(config_t), intent(in) :: config
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(inout) :: clock
-    real(wp) :: calm
+    real(dp) :: calm
     logical :: is_calm
 
     clock%peak_energy = max(clock%peak_energy, solver%tally%motion_energy)
@@ -425,12 +419,12 @@ contains
     class(observer_t), intent(inout) :: observer
     type(clock_t), intent(inout) :: clock
 
-    if (observer%history_interval > 0.0_wp .and. clock%time >= clock%next_history) then
+    if (observer%history_interval > 0.0_dp .and. clock%time >= clock%next_history) then
       call observer%note_history(history_row(config, solver, clock))
       clock%next_history = (floor(clock%time/observer%history_interval) &
         + 1)*observer%history_interval
     end if
-    if (observer%snapshot_interval > 0.0_wp .and. clock%time >= clock%next_snapshot) then
+    if (observer%snapshot_interval > 0.0_dp .and. clock%time >= clock%next_snapshot) then
       call show_state(solver, observer, clock)
       clock%next_snapshot = (floor(clock%time/observer%snapshot_interval) + 1)* &
         observer%snapshot_interval
@@ -442,9 +436,11 @@ contains
     type(solver_t), intent(in) :: solver
     class(observer_t), intent(inout) :: observer
     type(clock_t), intent(inout) :: clock
+    type(shown_particles_t) :: shown
 
     if (clock%shown_step == clock%step) return
-    call observer%note_state(clock%step, clock%time, solver%particles)
+    call show_particles(solver%particles, shown)
+    call observer%note_state(clock%step, clock%time, shown)
     clock%shown_step = clock%step
   end subroutine show_state
 
@@ -453,27 +449,30 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     type(history_row_t) :: row
-    real(wp) :: front(1)
+    real(dp) :: front(1), potential
 
     associate (s => solver%particles)
       row%time = clock%time
       row%kinetic_energy = solver%tally%kinetic_energy
       row%elastic_energy = elastic_energy(s, solver%materials)
-      row%potential_energy = potential_energy(s, config%loading%gravity)
+      potential = potential_energy(s, config%loading%gravity)
+      row%potential_energy = potential - sum(real(s%mass, dp))*dot_product(config%loading%gravity, &
+        s%origin)
       row%plastic_work = solver%internal_work - (row%elastic_energy - clock%elastic_at_start)
       row%damping_work = solver%damping_work
       row%wall_work = solver%wall_work
       row%dissipated = row%plastic_work + row%damping_work + row%wall_work
-      row%energy_error = energy_imbalance(row%potential_energy, solver, clock)
-      row%reaction = 0.0_wp
+      row%energy_error = energy_imbalance(potential, solver, clock)
+      row%reaction = 0.0_dp
       if (clock%step > 0) row%reaction = solver%grid%reaction(clock%time_step)
-      row%momentum = [sum(s%mass*s%vx), sum(s%mass*s%vy)]
+      row%momentum = [sum(real(s%mass, dp)*s%vx), sum(real(s%mass, dp)*s%vy)]
       row%angular_momentum = angular_momentum(s)
-      row%centre = [sum(s%mass*s%x), sum(s%mass*s%y)]/sum(s%mass)
+      row%centre = s%origin + [sum(real(s%mass, dp)*s%x), sum(real(s%mass, dp)*s%y)] &
+        /sum(real(s%mass, dp))
       row%front_max = farthest_edge(s)
-      front = mass_front(s, [0.995_wp])
+      front = mass_front(s, [0.995_dp])
       row%front_q995 = front(1)
-      row%height_max = surface_height(s, -huge(1.0_wp), huge(1.0_wp), config%grid%y_min)
+      row%height_max = surface_height(s, -huge(1.0_dp), huge(1.0_dp), config%grid%y_min)
     end associate
   end function history_row
 
@@ -483,10 +482,10 @@ contains
   !> the work of forces.
   !> `potential` is the present potential energy, J/m.
   pure function energy_imbalance(potential, solver, clock) result(share)
-    real(wp), intent(in) :: potential
+    real(dp), intent(in) :: potential
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
-    real(wp) :: share
+    real(dp) :: share
 
     share = (solver%tally%kinetic_energy + potential + solver%internal_work + solver%damping_work &
       + solver%wall_work - solver%force_work - clock%energy_at_start) &
@@ -495,13 +494,13 @@ contains
 
   !> What errors of energy are measured by, J/m.
   pure function energy_scale(potential, solver, clock) result(scale)
-    real(wp), intent(in) :: potential
+    real(dp), intent(in) :: potential
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
-    real(wp) :: scale
+    real(dp) :: scale
 
     scale = max(abs(clock%potential_at_start - potential), clock%peak_energy, &
-      clock%elastic_at_start, abs(solver%force_work), abs(solver%wall_work), tiny(1.0_wp))
+      clock%elastic_at_start, abs(solver%force_work), abs(solver%wall_work), tiny(1.0_dp))
   end function energy_scale
 
   !> Share of the energy of a swing by which kinetic + elastic energy reads wrong between two looks,
@@ -511,34 +510,34 @@ contains
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
     type(solver_t), intent(in) :: solver
-    real(wp) :: share
-    real(wp) :: side
+    real(dp) :: share
+    real(dp) :: side
     integer :: body
 
-    side = huge(1.0_wp)
+    side = huge(1.0_dp)
     do body = 1, size(solver%particles%bodies)
       associate (b => solver%particles%bodies(body), s => solver%particles)
         side = min(side, &
-          maxval(s%x(b%first:b%last)) - minval(s%x(b%first:b%last)) + b%width, &
-          maxval(s%y(b%first:b%last)) - minval(s%y(b%first:b%last)) + b%height)
+          real(maxval(s%x(b%first:b%last)) - minval(s%x(b%first:b%last)) + b%width, dp), &
+          real(maxval(s%y(b%first:b%last)) - minval(s%y(b%first:b%last)) + b%height, dp))
       end associate
     end do
     side = max(side, config%grid%cell_size)
-    share = 0.5_wp*acos(-1.0_wp)*scene%wave_speed*scene%first_step/side
+    share = 0.5_dp*acos(-1.0_dp)*scene%wave_speed*scene%first_step/side
   end function misread_energy
 
   !> Share of its volume that the most compressed point has lost, among those whose stress follows
   !> from its rate: it stores energy to first order in strain only.
   pure function compression(solver) result(share)
     type(solver_t), intent(in) :: solver
-    real(wp) :: share
+    real(dp) :: share
     integer :: body
 
-    share = 0.0_wp
+    share = 0.0_dp
     do body = 1, size(solver%particles%bodies)
       associate (b => solver%particles%bodies(body), s => solver%particles)
         if (solver%materials(b%material)%model == MODEL_NEO_HOOKEAN) cycle
-        share = max(share, 1.0_wp - solver%materials(b%material)%density &
+        share = max(share, 1.0_dp - solver%materials(b%material)%density &
           *minval(s%volume(b%first:b%last)/s%mass(b%first:b%last)))
       end associate
     end do
@@ -548,18 +547,18 @@ contains
   pure subroutine find_extreme_volume(solver, point, ratio)
     type(solver_t), intent(in) :: solver
     integer, intent(out) :: point
-    real(wp), intent(out) :: ratio
-    real(wp) :: here
+    real(dp), intent(out) :: ratio
+    real(dp) :: here
     integer :: body, p
 
     point = 1
-    ratio = 1.0_wp
+    ratio = 1.0_dp
     associate (s => solver%particles)
       do body = 1, size(s%bodies)
         do p = s%bodies(body)%first, s%bodies(body)%last
-          if (s%gap(p) > 0.0_wp) cycle
+          if (s%gap(p) > 0.0_dp) cycle
           here = solver%materials(s%bodies(body)%material)%density*s%volume(p)/s%mass(p)
-          if (max(here, 1.0_wp/here) <= max(ratio, 1.0_wp/ratio)) cycle
+          if (max(here, 1.0_dp/here) <= max(ratio, 1.0_dp/ratio)) cycle
           ratio = here
           point = p
         end do
@@ -575,35 +574,36 @@ contains
     type(solver_t), intent(in) :: solver
     type(clock_t), intent(in) :: clock
     type(outcome_t), intent(inout) :: outcome
-    real(wp) :: front(2), point_depth, cell, right_wall
-    real(wp), allocatable :: angles(:)
+    real(dp) :: front(2), point_depth, cell, right_wall
+    real(dp), allocatable :: angles(:)
     logical :: touched
 
     cell = config%grid%cell_size
     associate (s => solver%particles, v => outcome%values, g => config%grid)
       v(RUNOUT_MAX) = farthest_edge(s) - scene%toe
-      front = mass_front(s, [0.99_wp, 0.995_wp])
+      front = mass_front(s, [0.99_dp, 0.995_dp])
       v(RUNOUT_Q99) = front(1) - scene%toe
       v(RUNOUT_Q995) = front(2) - scene%toe
-      outcome%height = deposit_depth(s, scene%materials, g%x_min, cell, size(scene%profile_x))
+      outcome%height = deposit_depth(s, solver%materials, g%x_min, cell, size(scene%profile_x))
       ! Half the height of a point (CONTRACT; with 2 x 2 points a cell a single one in a column).
-      point_depth = 0.5_wp*minval(s%bodies%height, mask=s%bodies%is_measured)
+      point_depth = 0.5_dp*minval(s%bodies%height, mask=s%bodies%is_measured)
       v(RUNOUT_CONNECTED) = connected_front(outcome%height, g%x_min, cell, &
-                                            scene%extent(1) + 0.5_wp*cell, point_depth) - scene%toe
-      v(HEIGHT_MAX) = surface_height(s, -huge(1.0_wp), huge(1.0_wp), g%y_min) - g%y_min
+                                            scene%extent(1) + 0.5_dp*cell, point_depth) - scene%toe
+      v(HEIGHT_MAX) = surface_height(s, -huge(1.0_dp), huge(1.0_dp), g%y_min) - g%y_min
       v(HEIGHT_WALL) = surface_height(s, scene%extent(1), scene%extent(1) + cell, g%y_min) - g%y_min
-      v(SETTLED) = merge(1.0_wp, 0.0_wp, clock%settled)
+      v(SETTLED) = merge(1.0_dp, 0.0_dp, clock%settled)
       if (clock%settled) v(SETTLE_TIME) = clock%calm_since
       v(KINETIC_ENERGY_END) = solver%tally%motion_energy
-      v(KINETIC_ENERGY_RATIO) = solver%tally%motion_energy/max(clock%peak_energy, tiny(1.0_wp))
-      right_wall = g%x_min + (g%x_max - g%x_min)*(1.0_wp + variation%cell_stretch)
+      v(KINETIC_ENERGY_RATIO) = solver%tally%motion_energy/max(clock%peak_energy, tiny(1.0_dp))
+      right_wall = g%x_min + (g%x_max - g%x_min)*(1.0_dp + variation%cell_stretch)
       touched = scene%extent(2) < g%x_max - cell .and. v(RUNOUT_MAX) + scene%toe > right_wall - cell
-      touched = touched .or. (scene%extent(1) > g%x_min + cell .and. minval(s%x, &
+      touched = touched .or. (scene%extent(1) > g%x_min + cell .and. s%origin(1) + minval(s%x, &
         mask=s%is_measured()) < g%x_min + cell)
-      v(WALL_TOUCHED) = merge(1.0_wp, 0.0_wp, touched)
+      v(WALL_TOUCHED) = merge(1.0_dp, 0.0_dp, touched)
       v(ENERGY_ERROR) = energy_imbalance(potential_energy(s, config%loading%gravity), solver, clock)
-      v(MASS_ERROR) = sum(s%mass)/scene%mass - 1.0_wp
-      angles = pack(s%friction_angle, s%is_measured() .and. ieee_is_finite(s%friction_angle))
+      v(MASS_ERROR) = sum(real(s%mass, dp))/scene%mass - 1.0_dp
+      angles = pack(real(s%friction_angle, dp), s%is_measured() .and. &
+        ieee_is_finite(s%friction_angle))
       if (size(angles) > 0) then
         v(FIELD_MEAN) = sum(angles)/size(angles)
         v(FIELD_MIN) = minval(angles)

@@ -13,7 +13,7 @@ module sg_solver
   use sg_cell_average, only: cell_average_t
   use sg_config, only: config_t
   use sg_grid, only: grid_t, losses_t, tally_t
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_manufactured, only: manufactured_force
   use sg_materials, only: material_t, MODEL_NEO_HOOKEAN
   use sg_neo_hookean, only: find_stretch
@@ -60,15 +60,16 @@ module sg_solver
     logical :: averages_cells = .false.
     type(cell_average_t) :: cells
     !> Amplitude of the manufactured solution in m, 0: none; time in s.
-    real(wp) :: amplitude = 0.0_wp, time = 0.0_wp
+    real(wp) :: amplitude = 0.0_wp
+    real(dp) :: time = 0.0_dp
     type(grid_t) :: grid
     type(particles_t) :: particles
     !> What the last step found out about the points.
     type(tally_t) :: tally
     !> Work of the stresses, and energy taken by damping and by the walls since the start, J/m.
-    real(wp) :: internal_work = 0.0_wp, damping_work = 0.0_wp, wall_work = 0.0_wp
+    real(dp) :: internal_work = 0.0_dp, damping_work = 0.0_dp, wall_work = 0.0_dp
     !> Work of body forces other than gravity, J/m.
-    real(wp) :: force_work = 0.0_wp
+    real(dp) :: force_work = 0.0_dp
   contains
     procedure :: configure
     procedure :: start
@@ -115,12 +116,13 @@ contains
     end if
     if (any(this%materials%softens)) call this%particles%track_plastic_strain()
     this%averages_cells = config%solver%anti_locking == 'cell_average'
-    if (config%loading%body_force == 'manufactured') this%amplitude = config%loading%amplitude
+    if (config%loading%body_force == 'manufactured') this%amplitude = &
+      real(config%loading%amplitude, wp)
     this%carries_gradient = config%solver%transfer == 'tpic'
     if (this%carries_gradient) call this%particles%carry_gradient()
-    this%flip = merge(0.0_wp, config%solver%flip, this%carries_gradient)
-    this%gravity = config%loading%gravity
-    this%damping = config%loading%damping
+    this%flip = merge(0.0_wp, real(config%solver%flip, wp), this%carries_gradient)
+    this%gravity = real(config%loading%gravity, wp)
+    this%damping = real(config%loading%damping, wp)
   end subroutine configure
 
   !> Maps the initial state to the nodes.
@@ -162,15 +164,17 @@ contains
     end do
   end subroutine note_all
 
-  !> One step of `time_step` seconds.
-  subroutine advance(this, time_step)
+  !> One step of `seconds`.
+  subroutine advance(this, seconds)
     class(solver_t), intent(inout) :: this
-    real(wp), intent(in) :: time_step
+    real(dp), intent(in) :: seconds
+    real(wp) :: time_step
     type(losses_t) :: losses
 
+    time_step = real(seconds, wp)
     call this%tally%reset()
     ! Forces mapped in this step, of stresses too, are those of its end.
-    this%time = this%time + time_step
+    this%time = this%time + seconds
     select case (this%scheme)
     case (SCHEME_USL)
       call this%grid%integrate_momentum(time_step, this%gravity, this%damping, losses)

@@ -2,7 +2,7 @@
 !> the order of things within the stress update.
 module sg_stress_update
   use sg_drucker_prager, only: return_drucker_prager
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power
   use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_LINEAR_ELASTIC, &
     MODEL_MOHR_COULOMB, MODEL_NEO_HOOKEAN
@@ -28,7 +28,8 @@ contains
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
     real(wp), intent(in) :: time_step, gradient(BLOCK, 4)
-    real(wp), intent(inout) :: work, wave_squared
+    real(dp), intent(inout) :: work
+    real(wp), intent(inout) :: wave_squared
     type(strain_t) :: strain
     real(wp) :: twice, share(BLOCK)
     integer :: n

@@ -21,7 +21,7 @@
 !> laid out for the whole block first: vectors put together from numbers just computed would stall
 !> the loads behind them.
 module sg_transfer
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_vectors, only: VECTOR_BYTES
   use sg_weighting, only: axis_t, BLOCK, weights_t
   implicit none
@@ -81,7 +81,7 @@ contains
     real(wp), intent(in) :: mass, x(n), y(n), gradient(4, n)
     type(axis_t), intent(in) :: x_axis, y_axis
     real(wp), intent(inout) :: total(8, 0:(x_axis%last + 1)*(y_axis%last + 1) - 1)
-    real(wp), intent(inout) :: energy
+    real(dp), intent(inout) :: energy
     real(wp) :: dx(BLOCK, 3), dy(BLOCK, 3), at_point(2), along_x(2), twice
     integer :: p, i, j, node
 

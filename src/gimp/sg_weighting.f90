@@ -17,6 +17,7 @@
 !>   makes S linear there, (max(-d,0), 1-|d|, max(d,0)): the wall is then held exactly.
 module sg_weighting
   use sg_kinds, only: wp
+  use sg_rounding, only: COARSENESS
   implicit none
   private
 
@@ -31,6 +32,9 @@ module sg_weighting
   !> Narrowest domain of a point in cells (cpGIMP): below, the weights are linear but for a strip
   !> about the nodes that no longer matters, and the slopes would change within rounding.
   real(wp), parameter :: LEAST_WIDTH = 1.0e-3_wp
+  !> The same for uGIMP, whose weights are differences over twice the width; in single precision
+  !> they are known to 1e-3 here, on 160 cells.
+  real(wp), parameter :: LEAST_FIXED_WIDTH = 1.0e-11_wp*COARSENESS
 
   !> Weights of up to BLOCK points.
   type :: weights_t
@@ -92,7 +96,7 @@ contains
     real(wp) :: w, half_inverse_width, slope
     integer :: p
 
-    w = width(1)*axis%inverse_cell
+    w = max(width(1)*axis%inverse_cell, LEAST_FIXED_WIDTH)
     half_inverse_width = 0.5_wp/w
     slope = axis%inverse_cell/w
     !$omp simd

@@ -18,8 +18,9 @@ module sg_collapse
   use sg_random_field, only: random_field_t
   use sg_recorder, only: recorder_t
   use sg_scene, only: build_scene, scene_t
-  use sg_simulation, only: simulate, variation_t
+  use sg_simulate, only: simulate
   use sg_text, only: to_text
+  use sg_variation, only: variation_t
   implicit none
   private
 

@@ -12,10 +12,11 @@ program bench_kernel
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: outcome_t, reset_outcome, STEPS
   use sg_scene, only: build_scene, scene_t
-  use sg_simulation, only: simulate, variation_t
+  use sg_simulate, only: simulate
   use sg_solver, only: solver_t
   use sg_stress_update, only: update_stress
   use sg_transfer, only: gather_motion_and_gradient, map_momentum_and_force
+  use sg_variation, only: variation_t
   use sg_weighting, only: BLOCK, weights_t
   implicit none
 

@@ -13,7 +13,8 @@ program bench_startup
   use sg_philox, only: FIELD_STREAM
   use sg_plan, only: create_plan, plan_t
   use sg_scene, only: build_scene, scene_t
-  use sg_simulation, only: simulate, variation_t
+  use sg_simulate, only: simulate
+  use sg_variation, only: variation_t
   implicit none
 
   integer, parameter :: REPEATS = 50

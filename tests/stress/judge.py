@@ -9,6 +9,7 @@ broken    anything else: a signal, an internal error, a hang, a result that is n
 
 import math
 import re
+from dataclasses import dataclass
 
 import h5py
 import numpy as np
@@ -16,10 +17,27 @@ import numpy as np
 # Created energy that a completed run may show, as a share of the energy that moved; nothing physical creates
 # any. The elastic scenes of stable_cfl.py stay below 3 % at CFL 0.4, an unstable run gains many times this.
 ENERGY_SLACK = 0.05
-# Rounding: results are sums of at most 400 terms in double precision, at coordinates of up to 1e4 cells.
-ROUNDING = 1e-9
-# Rounding of stresses, as a share of the modulus.
-TRIAL_ROUNDING = 1e-13
+
+
+@dataclass(frozen=True)
+class Rounding:
+    """What rounding may do to the results of a precision."""
+
+    # Of a sum of 400 masses, and of stresses at their yield surface.
+    sums: float
+    # Of stresses, as a share of the modulus: the tolerance of planes in sg_mohr_coulomb.
+    trial: float
+    # Of energies, as a share of the largest, and of modulus times volume: a strain is known to 1e-16 or, rounded in
+    # each of some hundred steps, to 1e-6.
+    energy: float
+    strain: float
+
+
+# Coordinates are up to 1e4 cells, whose places are known to 1e-12 cells or, in single, to 1e-3 only.
+ROUNDINGS = {
+    "double": Rounding(sums=1e-9, trial=1e-13, energy=1e-12, strain=1e-14),
+    "single": Rounding(sums=5e-5, trial=5e-5, energy=1e-5, strain=1e-6),
+}
 # Profiles are stored in single precision.
 SINGLE = 2e-6
 # A centre may come so far, in cells, behind a wall before the program calls its point lost.
@@ -123,7 +141,8 @@ def check_member(case, label, member, directory, numbers):
             continue
         if not np.all(np.isfinite(value)):
             raise Broken(f"{label}: {name} of a member with status ok is {value}")
-    if abs(member["mass_error"]) > ROUNDING:
+    rounding = ROUNDINGS[facts["precision"]]
+    if abs(member["mass_error"]) > rounding.sums:
         raise Broken(f"{label}: mass_error {member['mass_error']:.3g}")
     path = directory / "snapshots" / f"{label}_r000001.h5"
     if not path.exists():
@@ -172,15 +191,16 @@ def check_state(label, facts, member, first, last):
         raise Broken(f"{label}: a point is outside the grid at the end of a completed run")
     if not last["volume"].min() > 0:
         raise Broken(f"{label}: a point has the volume {last['volume'].min():.3g}")
+    rounding = ROUNDINGS[facts["precision"]]
     columns = (x >= x_min) & (x < x_max)
     start = first["volume"][columns].sum()
     found = member["profile"].sum(dtype=float) * facts["cell"]
     # Depths are at the initial density; the first state of a relaxed body is no longer at it.
     allowed = 0.5 if facts.get("relaxed") else SINGLE
-    if abs(found - start) > allowed * start + ROUNDING * facts["cell"] ** 2:
+    if abs(found - start) > allowed * start + rounding.sums * facts["cell"] ** 2:
         raise Broken(f"{label}: the profile holds {found:.9g} m2 of {start:.9g}")
     excess = yield_excess(facts, last)
-    if excess > ROUNDING and facts.get("one_material", True):
+    if excess > rounding.sums and facts.get("one_material", True):
         raise Broken(f"{label}: stress beyond the yield surface by {excess:.3g} of itself")
 
 
@@ -190,10 +210,11 @@ def yield_excess(facts, state):
     A returned stress is as exact as the trial stress it came from, 1e-13 of it in sg_mohr_coulomb; a trial
     stress can be a fraction of the modulus.
     """
+    rounding = ROUNDINGS[facts["precision"]]
     xx, yy, _, xy = state["stress"].T
     radius = np.hypot(0.5 * (xx - yy), xy)
     high, low = 0.5 * (xx + yy) + radius, 0.5 * (xx + yy) - radius
-    size = np.abs(state["stress"]).max(axis=1) + TRIAL_ROUNDING / ROUNDING * facts["modulus"]
+    size = np.abs(state["stress"]).max(axis=1) + rounding.trial / rounding.sums * facts["modulus"]
     if facts["model"] in ("von_mises", "tresca"):
         return float(np.max((radius - facts["strength"]) / (size + facts["strength"])))
     if facts["model"] != "mohr_coulomb":
@@ -232,10 +253,10 @@ def check_energy(label, facts, member, history, last, numbers):
     """
     kinetic, elastic, potential = (history[f"{k}_energy"] for k in ("kinetic", "elastic", "potential"))
     change = potential - potential[0]
-    # Differences of energies are exact to a rounding of the largest of them, and of modulus times volume: a
-    # strain is known to 1e-16.
-    floor = 1e-12 * (np.abs(potential).max() + kinetic.max() + elastic.max())
-    floor += 1e-14 * facts["modulus"] * last["volume"].sum() + 1e-300
+    # Differences of energies are exact to a rounding of the largest of them, and of modulus times volume.
+    rounding = ROUNDINGS[facts["precision"]]
+    floor = rounding.energy * (np.abs(potential).max() + kinetic.max() + elastic.max())
+    floor += rounding.strain * facts["modulus"] * last["volume"].sum() + 1e-300
     taken = history["damping_work"] + history["wall_work"]
     scale = (
         max(kinetic.max(), np.abs(change).max(), elastic.max(), np.abs(taken).max()) + floor / ENERGY_SLACK

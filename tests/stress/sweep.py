@@ -1,6 +1,6 @@
 """Tries to break the program with many short runs: a designed sample of inputs, and awkward cases by hand.
 
-Usage: sweep.py EXE [--runs N] [--jobs J] [--seed S] [--out DIR] [--only NAME ...] [--no-edges]
+Usage: sweep.py EXE [--runs N] [--jobs J] [--seed S] [--out DIR] [--only NAME ...] [--no-edges] [--precision P]
 
 Every run ends in one of five verdicts (judge.py says how): ok, failed (a named failure), refused (bad input,
 where that is right), gained (created energy without a word) or broken. Exit code 1 if any run is broken or
@@ -105,10 +105,15 @@ def execute(command, directory):
     return code, text.decode(errors="replace")
 
 
-def all_cases(runs, seed, with_edges):
+def all_cases(runs, seed, with_edges, precision):
     """The awkward cases, then the first `runs` of the design."""
     cases = edge_cases() if with_edges else []
-    return cases + [designed_case(index, u) for index, u in enumerate(design(runs, seed))]
+    cases += [designed_case(index, u) for index, u in enumerate(design(runs, seed))]
+    for case in cases:
+        case["facts"]["precision"] = precision
+        if precision != "double":
+            case["text"] = case["text"].replace("&solver ", f"&solver precision='{precision}', ")
+    return cases
 
 
 def table(records):
@@ -170,6 +175,7 @@ def main():
     parser.add_argument("--out", type=Path)
     parser.add_argument("--only", nargs="*")
     parser.add_argument("--no-edges", action="store_true")
+    parser.add_argument("--precision", choices=("double", "single"), default="double")
     given = parser.parse_args()
     root = given.out or Path(tempfile.mkdtemp(prefix="sgimp_sweep_"))
     root.mkdir(parents=True, exist_ok=True)
@@ -177,7 +183,7 @@ def main():
     done = {}
     if journal.exists():
         done = {record["name"]: record for record in map(json.loads, journal.read_text().splitlines())}
-    cases = all_cases(given.runs, given.seed, not given.no_edges)
+    cases = all_cases(given.runs, given.seed, not given.no_edges, given.precision)
     if given.only:
         cases = [case for case in cases if case["name"] in given.only]
     missing = [case for case in cases if case["name"] not in done]

@@ -39,7 +39,8 @@ def self_weight_column(bench):
     # y(X) is the integral of exp(-w (L - X)/E): the stretch of the point at X carries the weight above it.
     height = young / weight * (1.0 - np.exp(-weight * length / young))
     state = bench.run("self_weight_column").last
-    y = np.unique(state.position[:, 1].round(12))
+    rows = state.start[:, 1].round(6)
+    y = [state.position[rows == row, 1].mean() for row in np.unique(rows)]
     yield close("height (closed form), m", 49.01320, height, 1e-7, "digits of the reference")
     yield close("height at 64 cells, m", height, y[-1] + 0.5 * (y[-1] - y[-2]), 1e-3, "demand 0.1 %")
     why = "the weight of half a cell of 64: the stress is constant in part of a cell"

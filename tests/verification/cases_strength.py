@@ -5,7 +5,8 @@ from judge import close, small
 
 ANGLE = np.radians(35.0)
 PASSIVE = (1.0 + np.sin(ANGLE)) / (1.0 - np.sin(ANGLE))
-EXACT = "demand 1e-8: the return is exact, the path homogeneous"
+# The return is exact, the path homogeneous. In single: eight roundings of 2^-23.
+EXACT = (1e-8, "demand 1e-8: the return is exact, the path homogeneous"), (1e-6, "the same, and eight roundings")
 DIGITS = "digits of the reference"
 
 
@@ -39,17 +40,17 @@ def element_compression(bench):
     yield close("Kp = tan^2(45 + phi/2)", 3.690172, PASSIVE, 1e-7, DIGITS)
     stress = all_stresses(bench.run("element_compression"))
     major, minor = principal(stress)
-    yield close("s1/s3 at yield, c = 0", PASSIVE, farthest(major / minor, PASSIVE), 1e-8, EXACT)
+    yield close("s1/s3 at yield, c = 0", PASSIVE, farthest(major / minor, PASSIVE), *bench.bound(*EXACT))
     yield close("Ka = s3/s1", 0.270990, farthest(minor / major, 0.270990), 3e-6, DIGITS)
     first, root = invariants(stress)
     ratio = np.sqrt(3.0) * root / (-first / 3.0)
     slope = 6.0 * np.sin(ANGLE) / (3.0 - np.sin(ANGLE))
-    yield close("q/p' = 6 sin(phi)/(3 - sin(phi))", slope, farthest(ratio, slope), 1e-8, EXACT)
+    yield close("q/p' = 6 sin(phi)/(3 - sin(phi))", slope, farthest(ratio, slope), *bench.bound(*EXACT))
     yield close("q/p' of the list", 1.418326, slope, 1e-6, DIGITS)
     last = bench.run("element_compression", {"material.cohesion": 50.0}).last.stress
     major, minor = principal(last)
     allowed = PASSIVE * minor + 2.0 * 50.0 * np.sqrt(PASSIVE)
-    yield close("s1/(Kp s3 + 2 c sqrt(Kp)), c = 50 Pa", 1.0, farthest(major / allowed, 1.0), 1e-8, EXACT)
+    yield close("s1/(Kp s3 + 2 c sqrt(Kp)), c = 50 Pa", 1.0, farthest(major / allowed, 1.0), *bench.bound(*EXACT))
 
 
 def element_extension(bench):
@@ -61,8 +62,8 @@ def element_extension(bench):
     first, root = invariants(stress)
     ratio = np.sqrt(3.0) * root / (-first / 3.0)
     slope = 6.0 * np.sin(ANGLE) / (3.0 + np.sin(ANGLE))
-    yield close("s1/s3 at yield", PASSIVE, farthest(major / minor, PASSIVE), 1e-8, EXACT)
-    yield close("q/p' = 6 sin(phi)/(3 + sin(phi))", slope, farthest(ratio, slope), 1e-8, EXACT)
+    yield close("s1/s3 at yield", PASSIVE, farthest(major / minor, PASSIVE), *bench.bound(*EXACT))
+    yield close("q/p' = 6 sin(phi)/(3 + sin(phi))", slope, farthest(ratio, slope), *bench.bound(*EXACT))
     yield close("q/p' of the list", 0.963029, slope, 1e-6, DIGITS)
 
 
@@ -74,10 +75,13 @@ def element_unconfined(bench):
     before = [s for s in states if s.time > 0.05 and (-s.stress[:, 1]).max() < 0.9 * strength]
     slopes = (before[0].stress[:, 1] - before[-1].stress[:, 1]) / (rate * (before[-1].time - before[0].time))
     modulus = young / (1.0 - poisson**2)
-    yield close("elastic slope E/(1 - nu^2), Pa", modulus, farthest(slopes, modulus), 1e-8, EXACT)
+    single = (1e-3, "the stress is rounded in each of 15000 steps, by half of 2^-23: 9e-4 if all one way")
+    yield close(
+        "elastic slope E/(1 - nu^2), Pa", modulus, farthest(slopes, modulus), *bench.bound(EXACT[0], single)
+    )
     major, minor = principal(states[-1].stress)
     limit = PASSIVE * minor + strength
-    yield close("s1/(Kp s3 + 2 c sqrt(Kp))", 1.0, farthest(major / limit, 1.0), 1e-8, EXACT)
+    yield close("s1/(Kp s3 + 2 c sqrt(Kp))", 1.0, farthest(major / limit, 1.0), *bench.bound(*EXACT))
     why = "damping of the side that moves out: rho c_d v L = 3e-6 Pa beside 3.8e-3 Pa"
     yield small("s3 at the free side, Pa, over s1", minor.max(), major.max(), 1e-3, why)
 

@@ -119,17 +119,22 @@ def run_namelist(executable, namelist, directory, codes=(0,)):
 
 
 class Bench:
-    """Runs cases of one directory with one executable; results are kept in a scratch directory."""
+    """Runs cases of one directory with one executable in one precision; results are kept in a scratch directory."""
 
-    def __init__(self, executable, inputs, scratch):
+    def __init__(self, executable, inputs, scratch, precision="double"):
         self.executable, self.inputs, self.scratch = Path(executable).resolve(), Path(inputs), Path(scratch)
+        self.precision = precision
         self.count = 0
+
+    def bound(self, double, single):
+        """What is allowed where rounding decides, and why: (allowed, why) of the precision of the runs."""
+        return single if self.precision == "single" else double
 
     def run(self, case, changes=None, fails=False):
         """Runs `case`.nml with changed keys. `fails`: a failed member (exit code 4) is no error."""
         self.count += 1
         groups = read_namelist(self.inputs / f"{case}.nml")
-        change_keys(groups, changes or {})
+        change_keys(groups, {"solver.precision": self.precision} | (changes or {}))
         for _, keys in groups:
             if "file" in keys:
                 keys["file"] = as_text(str((self.inputs / keys["file"].strip("'")).resolve()))

@@ -1,8 +1,8 @@
 """Runs cases of input/verification and compares their own output files with the references.
 
-Usage: verify.py --sgimp EXECUTABLE --inputs DIRECTORY [--table] [CASE ...]
+Usage: verify.py --sgimp EXECUTABLE --inputs DIRECTORY [--table] [--precision double single] [CASE ...]
 Without CASE all are run. Prints each number beside its reference; exit code 1 if one is missed.
-`--table` prints the table of README.md instead.
+`--table` prints the table of README.md instead, with both precisions beside each other if both are asked for.
 """
 
 import argparse
@@ -43,18 +43,37 @@ CASES = {
     "footing": (15, cases_footing.footing),
 }
 
-COLUMNS = ("case", "reference", "ours", "error", "allowed (and why)", "command")
+COLUMNS = ("ours", "error", "allowed (and why)")
 
 
-def table_row(number, case, check):
-    """One row of README.md; a number that is told and not judged has no error."""
-    error, allowed = f"{check.error:.1e}", f"{check.allowed:.1g} ({check.why})"
-    if not np.isfinite(check.allowed):
-        error, allowed = "", check.why
-    name = f"{number} {case}: {check.quantity}"
-    mark = "" if check.is_met else " **missed**"
-    command = f"`ctest -R verify_{case}`"
-    return "| " + " | ".join((name, check.reference, check.ours, error + mark, allowed, command)) + " |"
+def table_header(precisions):
+    """The columns of README.md; those of each precision, if there are more."""
+    columns = COLUMNS
+    if len(precisions) > 1:
+        columns = [f"{precision}: {column}" for precision in precisions for column in COLUMNS]
+    columns = ("case", "reference", *columns, "command")
+    return "| " + " | ".join(columns) + " |\n" + "|---" * len(columns) + "|"
+
+
+def table_row(number, case, checks):
+    """One row of the table, from the same number in each precision; what is told and not judged has no error."""
+    cells = [f"{number} {case}: {checks[0].quantity}", checks[0].reference]
+    for check in checks:
+        error, allowed = f"{check.error:.1e}", f"{check.allowed:.1g} ({check.why})"
+        if not np.isfinite(check.allowed):
+            error, allowed = "", check.why
+        cells += [check.ours, error + ("" if check.is_met else " **missed**"), allowed]
+    return "| " + " | ".join((*cells, f"`ctest -R verify_{case}`")) + " |"
+
+
+def report(case, precisions, checks):
+    """The same number in each precision, a line each."""
+    for precision, check in zip(precisions, checks, strict=True):
+        name = case if precision == "double" else f"{case}, {precision}"
+        print(
+            f"{name}: {check.quantity}: reference {check.reference}, ours {check.ours}, error "
+            f"{check.error:.1e}, allowed {check.allowed:.0e}{'' if check.is_met else '  MISSED'}"
+        )
 
 
 def main():
@@ -63,23 +82,25 @@ def main():
     parser.add_argument("--sgimp", type=Path, required=True, help="executable")
     parser.add_argument("--inputs", type=Path, required=True, help="directory of the namelists")
     parser.add_argument("--table", action="store_true", help="print rows of a table")
+    parser.add_argument("--precision", nargs="+", choices=("double", "single"), default=["double"])
     parser.add_argument("case", nargs="*", choices=[*CASES, []], help="cases to run")
     options = parser.parse_args()
     missed = 0
     if options.table:
-        print("|", " | ".join(COLUMNS), "|\n" + "|---" * len(COLUMNS) + "|")
+        print(table_header(options.precision))
     for case in options.case or CASES:
         number, judge = CASES[case]
         with tempfile.TemporaryDirectory() as scratch:
-            for check in judge(Bench(options.sgimp, options.inputs, scratch)):
-                missed += not check.is_met
+            benches = []
+            for precision in options.precision:
+                (folder := Path(scratch, precision)).mkdir()
+                benches.append(Bench(options.sgimp, options.inputs, folder, precision))
+            for checks in zip(*(judge(bench) for bench in benches), strict=True):
+                missed += sum(not check.is_met for check in checks)
                 if options.table:
-                    print(table_row(number, case, check), flush=True)
+                    print(table_row(number, case, checks), flush=True)
                 else:
-                    print(
-                        f"{case}: {check.quantity}: reference {check.reference}, ours {check.ours}, error "
-                        f"{check.error:.1e}, allowed {check.allowed:.0e}{'' if check.is_met else '  MISSED'}"
-                    )
+                    report(case, options.precision, checks)
     return 1 if missed else 0
 
 

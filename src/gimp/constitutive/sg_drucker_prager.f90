@@ -11,15 +11,14 @@
 module sg_drucker_prager
   use sg_kinds, only: wp
   use sg_materials, only: material_t
+  use sg_rounding, only: COARSENESS, LEAST_STRESS
   implicit none
   private
 
   public :: return_drucker_prager
 
-  !> Guards the division by q, in Pa; where q is 0 so is what it divides.
-  real(wp), parameter :: LEAST_Q = 1.0e-100_wp
   !> A deviator below this share of the stresses involved is rounding: the point is at the tip.
-  real(wp), parameter :: ROUNDING = 1.0e-13_wp
+  real(wp), parameter :: ROUNDING = 1.0e-13_wp*COARSENESS
 
 contains
 
@@ -48,7 +47,7 @@ contains
       limited = new_mean > material%mean_limit
       new_q = merge(min(q, at_limit), new_q, limited)
       new_mean = min(new_mean, material%mean_limit)
-      ratio = new_q/max(q, LEAST_Q)
+      ratio = new_q/max(q, LEAST_STRESS)
       ! The mean is moved by its change, so that a stress within the cone stays as it is.
       sxx(p) = mean + ratio*dxx + (new_mean - mean)
       syy(p) = mean + ratio*dyy + (new_mean - mean)

@@ -18,6 +18,7 @@
 module sg_mohr_coulomb
   use sg_kinds, only: wp
   use sg_materials, only: material_t
+  use sg_rounding, only: COARSENESS, LEAST_STRESS
   use sg_weighting, only: BLOCK
   implicit none
   private
@@ -46,10 +47,7 @@ module sg_mohr_coulomb
     REGION_CUT_OFF, REGION_CUT_OFF]
   !> Admissible violation of a condition, as a share of the stresses involved: some hundred
   !> roundings.
-  real(wp), parameter :: ROUNDING = 1.0e-13_wp
-  !> Guards the division by the radius of Mohr's circle, in Pa; where the radius is 0 so is what it
-  !> divides.
-  real(wp), parameter :: LEAST_RADIUS = 1.0e-100_wp
+  real(wp), parameter :: ROUNDING = 1.0e-13_wp*COARSENESS
 
   !> Trial stresses of a block: principal ones in the plane (a >= b) and out of it (z); radius of
   !> Mohr's circle and the two components that give its direction.
@@ -151,7 +149,7 @@ contains
       violation(p) = max(max(middle - high, low - middle), high - tension_limit(p))
       new_a = merge(high, middle, trial%a(p) >= trial%z(p))
       new_b = merge(low, middle, trial%b(p) <= trial%z(p))
-      ratio = 0.5_wp*(new_a - new_b)/max(trial%radius(p), LEAST_RADIUS)
+      ratio = 0.5_wp*(new_a - new_b)/max(trial%radius(p), LEAST_STRESS)
       centre = 0.5_wp*(new_a + new_b)
       sxx(p) = centre + ratio*trial%half_difference(p)
       syy(p) = centre - ratio*trial%half_difference(p)
@@ -215,7 +213,7 @@ contains
         call return_principal(material, strength, [a, z, b], returned, region)
         new_a = returned(1); new_z = returned(2); new_b = returned(3)
       end if
-      ratio = 0.5_wp*(new_a - new_b)/max(trial%radius(p), LEAST_RADIUS)
+      ratio = 0.5_wp*(new_a - new_b)/max(trial%radius(p), LEAST_STRESS)
       stress(1) = 0.5_wp*(new_a + new_b) + ratio*trial%half_difference(p)
       stress(2) = 0.5_wp*(new_a + new_b) - ratio*trial%half_difference(p)
       stress(3) = new_z

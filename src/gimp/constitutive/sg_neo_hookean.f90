@@ -3,7 +3,7 @@
 !>   energy per initial volume W = mu/2 (tr b - 2 - 2 ln J) + lambda/2 (ln J)^2, tr b in the plane
 !> (Bonet & Wood 2008).
 module sg_neo_hookean
-  use sg_kinds, only: wp
+  use sg_kinds, only: dp, wp
   use sg_weighting, only: BLOCK
   implicit none
   private
@@ -60,13 +60,13 @@ contains
     end do
   end subroutine find_neo_hookean_stress
 
-  !> W in J/m^3.
+  !> W in J/m^3. In double precision, since little is left of the first bracket at small strains.
   elemental function neo_hookean_energy(lame, shear, fxx, fxy, fyx, fyy) result(energy)
-    real(wp), intent(in) :: lame, shear, fxx, fxy, fyx, fyy
-    real(wp) :: energy, log_j
+    real(dp), intent(in) :: lame, shear, fxx, fxy, fyx, fyy
+    real(dp) :: energy, log_j
     log_j = log(fxx*fyy - fxy*fyx)
-    energy = 0.5_wp*shear*(fxx**2 + fxy**2 + fyx**2 + fyy**2 - 2.0_wp - 2.0_wp*log_j) &
-      + 0.5_wp*lame*log_j**2
+    energy = 0.5_dp*shear*(fxx**2 + fxy**2 + fyx**2 + fyy**2 - 2.0_dp - 2.0_dp*log_j) &
+      + 0.5_dp*lame*log_j**2
   end function neo_hookean_energy
 
   !> Largest squared wave speed in the present configuration, (m/s)^2: along a principal stretch s,

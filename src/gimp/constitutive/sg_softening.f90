@@ -13,6 +13,7 @@ module sg_softening
   use sg_kinds, only: wp
   use sg_materials, only: material_t, mohr_coulomb_strength
   use sg_mohr_coulomb, only: return_stress
+  use sg_rounding, only: COARSENESS
   use sg_weighting, only: BLOCK
   implicit none
   private
@@ -21,7 +22,7 @@ module sg_softening
 
   !> Rounds of the iteration, and the change of kappa at which it ends.
   integer, parameter :: MOST_ROUNDS = 60
-  real(wp), parameter :: CONVERGED = 1.0e-14_wp
+  real(wp), parameter :: CONVERGED = 1.0e-14_wp*COARSENESS
   real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
 contains
