@@ -2,27 +2,26 @@
 if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
   set(CMAKE_BUILD_TYPE Release CACHE STRING "Release or Debug" FORCE)
 endif()
-set(SGIMP_ARCH "default" CACHE STRING
-  "Instruction set: default (x86-64-v3 on x86-64), native, or any value of -march=")
-set(SGIMP_ARCH_FLAG "")
-if(SGIMP_ARCH STREQUAL "default")
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-    set(SGIMP_ARCH_FLAG -march=x86-64-v3)
-  endif()
-elseif(SGIMP_ARCH)
-  set(SGIMP_ARCH_FLAG -march=${SGIMP_ARCH})
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-    # A node of the grid is eight numbers: one vector where the processor has such.
-    list(APPEND SGIMP_ARCH_FLAG -mprefer-vector-width=512)
-  endif()
+set(SGIMP_ARCH "native" CACHE STRING
+  "Instruction set: native, that of this machine, or any value of -march=, for instance x86-64-v3")
+set(SGIMP_ARCH_FLAG -march=${SGIMP_ARCH})
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  # A node of the grid is eight numbers: one vector where the processor has such.
+  list(APPEND SGIMP_ARCH_FLAG -mprefer-vector-width=512)
 endif()
-
-# Longest vectors of the instruction set, for kernels that have a form for each length.
+# What the instruction set holds: the longest vectors, for kernels that have a form for each length, and what the
+# program looks for when it starts, so that a processor without it gets a message and not an illegal instruction.
 set(SGIMP_VECTOR_BYTES 32)
+set(SGIMP_NEEDS "")
 if(CMAKE_BUILD_TYPE STREQUAL "Release")
-  execute_process(COMMAND ${CMAKE_C_COMPILER} ${SGIMP_ARCH_FLAG} -dM -E -x c /dev/null
+  execute_process(COMMAND ${CMAKE_C_COMPILER} -march=${SGIMP_ARCH} -dM -E -x c /dev/null
     OUTPUT_VARIABLE macros ERROR_QUIET)
-  if(macros MATCHES "__AVX512F__")
+  foreach(feature AVX2 FMA AVX512F AVX512DQ AVX512BW AVX512VL)
+    if(macros MATCHES "__${feature}__")
+      list(APPEND SGIMP_NEEDS SGIMP_NEEDS_${feature})
+    endif()
+  endforeach()
+  if("SGIMP_NEEDS_AVX512F" IN_LIST SGIMP_NEEDS)
     set(SGIMP_VECTOR_BYTES 64)
   endif()
 endif()
@@ -38,7 +37,8 @@ if(CMAKE_Fortran_COMPILER_ID STREQUAL "GNU")
   set(SGIMP_FLAGS_WARNINGS -Wall -Wextra -pedantic -Wimplicit-interface -Wno-compare-reals
     -Wno-unused-dummy-argument)
   # CMake adds -O3. No -ffast-math: comparisons with NaN stay honest. What is given up is errno, floating point
-  # traps and the sign of zero, which lets the compiler turn max, min and merge into vector instructions.
+  # traps and the sign of zero, which lets the compiler turn max, min and merge into vector instructions. GNU Fortran
+  # then also takes the liberty that the Fortran standard gives, to order sums anew where no bracket forbids it.
   set(SGIMP_FLAGS_RELEASE ${SGIMP_ARCH_FLAG} -fno-math-errno -fno-trapping-math -fno-signed-zeros)
   set(SGIMP_FLAGS_DEBUG -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow -fbacktrace)
 endif()

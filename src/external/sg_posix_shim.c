@@ -15,6 +15,37 @@
 #include <time.h>
 #include <unistd.h>
 
+/* Before anything else: a program built for another processor says so, instead of dying of an
+ * illegal instruction. */
+#define NEED(feature) if (!__builtin_cpu_supports(feature)) missing = feature
+__attribute__((constructor)) static void check_processor(void)
+{
+  const char *missing = NULL;
+#ifdef SGIMP_NEEDS_AVX2
+  NEED("avx2");
+#endif
+#ifdef SGIMP_NEEDS_FMA
+  NEED("fma");
+#endif
+#ifdef SGIMP_NEEDS_AVX512F
+  NEED("avx512f");
+#endif
+#ifdef SGIMP_NEEDS_AVX512DQ
+  NEED("avx512dq");
+#endif
+#ifdef SGIMP_NEEDS_AVX512BW
+  NEED("avx512bw");
+#endif
+#ifdef SGIMP_NEEDS_AVX512VL
+  NEED("avx512vl");
+#endif
+  if (missing == NULL)
+    return;
+  fprintf(stderr, "sgimp: built for a processor with %s, which this one has not; build it on such "
+    "a machine as this, or with -D SGIMP_ARCH=x86-64-v3 (preset portable)\n", missing);
+  _exit(1);
+}
+
 static volatile sig_atomic_t caught_signal = 0;
 
 static void note_signal(int number) { caught_signal = number; }
