@@ -123,7 +123,7 @@ def check_member(runner):
     case = ("small.nml", (FAULTY.parent / "small.nml").read_bytes())
     for study_case, realization, expected, said in (
         ("csx_cov0.10", "60", 0, "60 of csx_cov0.10"),
-        ("csx_cov0.10", "61", 2, "realizations 1 to 60"),
+        ("csx_cov0.10", "161", 2, "realizations 1 to 160"),
         ("csx_cov0.1", "1", 2, "no study case is called csx_cov0.1"),
         (None, "1", 2, "needs --study-case"),
     ):
