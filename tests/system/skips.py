@@ -15,7 +15,7 @@ from common import Program, arguments, check, check_equal, columns
 EXACT = ("empty_nodes", "gaps", "dilation", "deformation", "plastic_strain", "wave_speed", "ledger")
 ROUNDED = ("exact_return", "velocity_gradient")
 # Largest difference over the largest number of a dataset after fifty steps, a hundred times what is found: velocities
-# of some m/s are rounded by 1e-15, the strain of a step alike, and with Young's modulus that is 1e-9 Pa in stresses of 10.
+# of some m/s are rounded by 1e-15, the strains of a step alike; with Young's modulus that is 1e-9 Pa in stresses of 10.
 ROUNDINGS = {"double": 1.0e-8, "single": 1.0e-4}
 
 GRID = "&grid x_max=12, y_max=6, cell_size=0.5, {walls} /\n"
