@@ -99,9 +99,7 @@ class Judge:
         `but` in them do not count."""
         what = f"{other.name} beside {one.name}"
         pairs = [(one / "ensemble.h5", other / "ensemble.h5", "cases")]
-        pairs += [
-            (path, other / "snapshots" / path.name, "/") for path in sorted((one / "snapshots").glob("*.h5"))
-        ]
+        pairs += [(path, other / "snapshots" / path.name, "/") for path in sorted((one / "snapshots").glob("*.h5"))]
         for left, right, root in pairs:
             with h5py.File(left) as first, h5py.File(right) as second:
                 names = datasets(first[root], but)
