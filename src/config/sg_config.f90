@@ -83,6 +83,8 @@ module sg_config
     real(wp) :: time_step
     real(wp) :: end_time
     real(wp) :: settle
+    !> Work that is done although the scene can do without it; size 0 for none.
+    character(len=NAME_LENGTH), allocatable :: needless(:)
   end type solver_config_t
 
   type :: random_field_config_t

@@ -252,6 +252,7 @@ contains
     call visitor%visit('cfl', config%solver%cfl)
     call visitor%visit('end_time', config%solver%end_time)
     call visitor%visit('settle', config%solver%settle)
+    call visitor%visit_list('needless', config%solver%needless)
   end subroutine visit_solver
 
   subroutine visit_random_field(config, visitor)

@@ -50,7 +50,7 @@ module sg_schema
     !> Interval of numbers: '[' and ']' include the bound, '(' and ')' exclude it; a missing bound
     !> is no bound.
     character(len=24) :: range = '(,)'
-    character(len=80) :: choices = ''
+    character(len=128) :: choices = ''
     character(len=96) :: later = ''
     !> Number of values, or ANY_NUMBER.
     integer :: size = 1
@@ -234,6 +234,9 @@ module sg_schema
     required=.true., when='body_force', when_is='manufactured', &
     meaning='Amplitude of the manufactured solution')]
 
+  character(len=*), parameter :: NEEDLESS_WORK = 'empty_nodes gaps dilation exact_return '// &
+    'deformation plastic_strain velocity_gradient wave_speed ledger'
+
   type(key_t), parameter :: SOLVER_KEYS(*) = [ &
     key_t('solver', 'weighting', KIND_WORD, default='gimp', &
     choices='linear gimp cpgimp bspline', meaning='Weighting function of a point: gimp is '// &
@@ -257,7 +260,10 @@ module sg_schema
     key_t('solver', 'end_time', KIND_REAL, unit='s', example='5', range='(0,)', required=.true., &
     meaning='Time at which a run ends, at the latest'), &
     key_t('solver', 'settle', KIND_REAL, unit='1', default='1e-4', range='[0,1)', &
-    meaning='End once kinetic energy stays under this share of its peak, front still; 0: never')]
+    meaning='End once kinetic energy stays under this share of its peak, front still; 0: never'), &
+    key_t('solver', 'needless', KIND_WORD, size=ANY_NUMBER, choices=NEEDLESS_WORK, &
+    meaning='Work that is done although the scene can do without it: for tests of what is '// &
+    'skipped, and of what that saves (docs/skips.md)')]
 
   type(key_t), parameter :: RANDOM_FIELD_KEYS(*) = [ &
     key_t('random_field', 'property', KIND_WORD, default='friction_angle', &

@@ -43,6 +43,11 @@ module sg_materials
     !> Drucker-Prager: f = sqrt(J2) + alpha I1 - k, flow with alpha_flow, mean stress at most
     !> mean_limit; k and mean_limit in Pa.
     real(wp) :: alpha = 0.0_wp, alpha_flow = 0.0_wp, k = 0.0_wp, mean_limit = 0.0_wp
+    !> Work that is asked for although points can do without it (docs/skips.md): gaps are closed
+    !> where there is none, the multiplier is divided for without dilation.
+    logical :: closes_all_gaps = .false., divides_always = .false.
+    !> Points that leave the plane by more, in Pa, take the exact return.
+    real(wp) :: most_violation = 0.0_wp
   end type material_t
 
 contains

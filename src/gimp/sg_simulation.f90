@@ -80,6 +80,7 @@ module sg_simulation
     !> Rise of the kinetic energy after which the ledger is looked at at once, and the energy that
     !> it is counted from: the least since the last look, J/m.
     real(dp) :: notable_rise = 0.0_dp, least_kinetic = 0.0_dp
+    integer :: steps_per_ledger = STEPS_PER_LEDGER, steps_per_strain = STEPS_PER_STRAIN
     logical :: settled = .false.
   end type clock_t
 
@@ -244,6 +245,10 @@ contains
     clock%energy_at_start = solver%tally%kinetic_energy + clock%potential_at_start
     clock%elastic_at_start = elastic_energy(solver%particles, solver%materials)
     clock%least_energy = clock%energy_at_start + clock%elastic_at_start
+    if (any(config%solver%needless == 'ledger')) then
+      clock%steps_per_ledger = 1
+      clock%steps_per_strain = 1
+    end if
   end subroutine start_clock
 
   !> CFL h/(c + v) with the present wave and point speeds, or the fixed step; never past the end.
@@ -314,9 +319,9 @@ contains
       else
         clock%least_kinetic = min(clock%least_kinetic, t%kinetic_energy)
         is_last = clock%time >= config%solver%end_time
-        if (mod(clock%step, STEPS_PER_LEDGER) == 0 .or. is_last &
+        if (mod(clock%step, clock%steps_per_ledger) == 0 .or. is_last &
           .or. t%kinetic_energy > clock%least_kinetic + clock%notable_rise) call check_ledger()
-        if (outcome%status == STATUS_OK .and. (mod(clock%step, STEPS_PER_STRAIN) == 0 &
+        if (outcome%status == STATUS_OK .and. (mod(clock%step, clock%steps_per_strain) == 0 &
           .or. is_last)) call check_strain()
       end if
     end associate

@@ -53,6 +53,12 @@ module sg_solver
     logical :: carries_gradient = .false.
     !> Share of FLIP (1 - share is PIC), gravity in m/s^2, damping in 1/s.
     real(wp) :: flip, gravity(2), damping
+    !> Points keep that gradient, whether it is carried or not.
+    logical :: keeps_gradient = .false.
+    !> A fixed time step asks for no wave speed.
+    logical :: finds_wave_speed = .true.
+    !> The grid visits all its nodes, not only those in the window around the points.
+    logical :: visits_all_nodes = .false.
     !> The domains of the points follow their stretch (cpGIMP).
     logical :: stretches_domains = .false.
     type(material_t), allocatable :: materials(:)
@@ -74,6 +80,8 @@ module sg_solver
     procedure :: configure
     procedure :: start
     procedure :: advance
+    procedure, private :: do_needless
+    procedure, private :: limit_grid
     procedure, private :: sweep_points
     procedure, private :: sweep_block
     procedure, private :: find_weights
@@ -119,11 +127,30 @@ contains
     if (config%loading%body_force == 'manufactured') this%amplitude = &
       real(config%loading%amplitude, wp)
     this%carries_gradient = config%solver%transfer == 'tpic'
-    if (this%carries_gradient) call this%particles%carry_gradient()
+    this%keeps_gradient = this%carries_gradient
     this%flip = merge(0.0_wp, real(config%solver%flip, wp), this%carries_gradient)
+    this%finds_wave_speed = .not. config%solver%time_step > 0.0_dp
     this%gravity = real(config%loading%gravity, wp)
     this%damping = real(config%loading%damping, wp)
+    call this%do_needless(config%solver%needless)
+    if (this%keeps_gradient) call this%particles%carry_gradient()
   end subroutine configure
+
+  !> Switches on the work that the scene can do without and that is asked for by `words`. Each word
+  !> has its place here; `ledger` is that of sg_simulation.
+  subroutine do_needless(this, words)
+    class(solver_t), intent(inout) :: this
+    character(len=*), intent(in) :: words(:)
+
+    this%visits_all_nodes = any(words == 'empty_nodes')
+    this%finds_wave_speed = this%finds_wave_speed .or. any(words == 'wave_speed')
+    this%keeps_gradient = this%keeps_gradient .or. any(words == 'velocity_gradient')
+    this%materials%closes_all_gaps = any(words == 'gaps')
+    this%materials%divides_always = any(words == 'dilation')
+    if (any(words == 'exact_return')) this%materials%most_violation = -huge(1.0_wp)
+    if (any(words == 'deformation')) call this%particles%track_deformation()
+    if (any(words == 'plastic_strain')) call this%particles%track_plastic_strain()
+  end subroutine do_needless
 
   !> Maps the initial state to the nodes.
   subroutine start(this)
@@ -138,8 +165,15 @@ contains
     call this%average_pressure()
     call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
       0.0_wp)
-    call this%grid%set_window(this%tally)
+    call this%limit_grid()
   end subroutine start
+
+  !> Leaves to the grid the nodes that points can reach; those it visits are all of them before.
+  subroutine limit_grid(this)
+    class(solver_t), intent(inout) :: this
+
+    if (.not. this%visits_all_nodes) call this%grid%set_window(this%tally)
+  end subroutine limit_grid
 
   !> Bounds, energy and speeds of the initial state.
   subroutine note_all(this)
@@ -199,7 +233,7 @@ contains
     this%damping_work = this%damping_work + losses%damping
     this%wall_work = this%wall_work + losses%walls
     this%internal_work = this%internal_work + this%tally%internal_work
-    call this%grid%set_window(this%tally)
+    call this%limit_grid()
   end subroutine advance
 
   !> A sweep that updates stress. Where cells are averaged, in four passes: rates in the cells,
@@ -268,7 +302,7 @@ contains
         return
       end if
       call this%find_weights(first, last, w)
-      keep_gradient = this%carries_gradient .and. sweep%update_velocity
+      keep_gradient = this%keeps_gradient .and. sweep%update_velocity
       if (sweep%update_stress .or. sweep%average_divergence .or. keep_gradient) then
         call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &
           g%motion_store(g%motion_start), value, gradient)
@@ -292,7 +326,9 @@ contains
           gradient(:n, 4) = gradient(:n, 4) + change(:n)
         end if
         call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
-          this%tally%internal_work, this%tally%wave_squared)
+          this%tally%internal_work)
+        if (this%finds_wave_speed) this%tally%wave_squared = max(this%tally%wave_squared, &
+          wave_speed_squared(p, this%materials(body%material), first, last))
       end if
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first), &

@@ -20,16 +20,13 @@ module sg_stress_update
 contains
 
   !> Takes the points `first` to `last`, all of one material, one step further. `gradient` of the
-  !> velocity in 1/s. Adds the work of their stresses to `work` (J/m) and raises `wave_squared`, the
-  !> largest squared wave speed, (m/s)^2.
-  subroutine update_stress(particles, material, first, last, time_step, gradient, work, &
-    wave_squared)
+  !> velocity in 1/s. Adds the work of their stresses to `work` (J/m).
+  subroutine update_stress(particles, material, first, last, time_step, gradient, work)
     type(particles_t), intent(inout) :: particles
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
     real(wp), intent(in) :: time_step, gradient(BLOCK, 4)
     real(dp), intent(inout) :: work
-    real(wp), intent(inout) :: wave_squared
     type(strain_t) :: strain
     real(wp) :: twice, share(BLOCK)
     integer :: n
@@ -46,7 +43,7 @@ contains
         call hyperelastic_block(p, material, first, last)
       else
         share = 1.0_wp
-        if (has_gap(n, p%gap(first:last))) then
+        if (material%closes_all_gaps .or. has_gap(n, p%gap(first:last))) then
           if (material%is_brittle) call release_open(n, material%bulk, p%gap(first:last), &
             p%sxx(first:last), p%syy(first:last), p%szz(first:last), p%sxy(first:last))
           call close_gap(n, time_step, gradient, p%gap(first:last), share)
@@ -60,7 +57,6 @@ contains
         p%syy(first:last), p%sxy(first:last))
     end associate
     work = work + 0.5_wp*twice
-    wave_squared = max(wave_squared, wave_speed_squared(particles, material, first, last))
   end subroutine update_stress
 
   !> Stress and volume of neo-Hookean points from their deformation gradient.

@@ -158,7 +158,7 @@ contains
     end do
 
     do p = 1, n
-      if (.not. violation(p) > 0.0_wp) cycle
+      if (.not. violation(p) > material%most_violation) cycle
       call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p), &
         sin_dilation(p)], trial, p, stress, opening)
       sxx(p) = stress(1)
@@ -178,7 +178,7 @@ contains
     real(wp), intent(inout) :: compliance(BLOCK)
     integer :: p
 
-    if (material%sin_dilation > 0.0_wp) then
+    if (material%sin_dilation > 0.0_wp .or. material%divides_always) then
       !$omp simd
       do p = 1, n
         compliance(p) = 1.0_wp/(4.0_wp*material%shear + 4.0_wp*((material%lame &
