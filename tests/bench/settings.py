@@ -72,13 +72,15 @@ def run(options, scratch, name, changes):
     """Columns of all members, {case of the study: {column: [members]}}."""
     changes = NO_OUTPUT | dict(options.both) | dict(changes)
     for key in ("realizations", "noise_members"):
-        if getattr(options, key):
+        if getattr(options, key) is not None:
             changes[f"monte_carlo.{key}"] = getattr(options, key)
     directory = scratch / name
     namelist = directory.with_suffix(".nml")
     write_changed(options.case, changes, namelist)
     command = on_ranks(options.ranks, [options.executable, namelist, "--output", directory], options.mpiexec)
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
+    done = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, env=environment())
+    if done.returncode not in (0, 4):  # 4: complete, with failed members, which are told
+        sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}")
     with h5py.File(directory / "ensemble.h5") as file:
         return {label: {c: group[c][:] for c in COLUMNS} for label, group in file["cases"].items()}
 
@@ -86,7 +88,7 @@ def run(options, scratch, name, changes):
 def compare(label, first, second, noise):
     """Rows of the table for one case of the study."""
     good = (first["status"] == 0) & (second["status"] == 0)
-    for name in (*RUNOUTS, *TOLD):
+    for name in (*RUNOUTS, *TOLD) if good.any() else ():
         change = (second[name] - first[name])[good]
         spread = np.std(change, ddof=1) if len(change) > 1 else np.nan
         floor = np.std(noise[name], ddof=1) if len(noise[name]) > 1 else np.nan
