@@ -21,6 +21,9 @@
 __attribute__((constructor)) static void check_processor(void)
 {
   const char *missing = NULL;
+#if defined(__x86_64__) || defined(__i386__)
+  __builtin_cpu_init();
+#endif
 #ifdef SGIMP_NEEDS_AVX2
   NEED("avx2");
 #endif

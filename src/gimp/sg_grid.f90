@@ -226,7 +226,8 @@ contains
     damping_work = damping_work*damping*time_step
   end subroutine integrate_nodes
 
-  !> motion(3:8) = p_i/m_i, thrice, with walls, before the stresses are updated (scheme usf). Keeps the sums.
+  !> motion(3:8) = p_i/m_i, thrice, with walls, before the stresses are updated (scheme usf). Keeps
+  !> the sums.
   subroutine find_velocity(this)
     class(grid_t), intent(inout) :: this
 

@@ -15,6 +15,7 @@ module sg_simulation
     RUNOUT_Q995, SECONDS, SETTLE_TIME, SETTLED, STATUS_ABANDONED, STATUS_ENERGY_CREATED, &
     STATUS_EXTREME_STRAIN, STATUS_NOT_FINITE, STATUS_OK, STATUS_POINT_LOST, STATUS_RUNAWAY, &
     STATUS_STEP_COLLAPSE, STATUS_TIME_LIMIT, STEPS, WALL_TOUCHED
+  use sg_particles, only: particles_t
   use sg_particle_copy, only: show_particles, take_particles
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
@@ -205,16 +206,11 @@ contains
     type(variation_t), intent(in) :: variation
     class(observer_t), intent(in) :: observer
     type(solver_t), intent(out) :: solver
-    type(shown_particles_t) :: first
     type(config_t) :: here
     integer :: k
 
     solver%materials = [(create_material(config%materials(k)), k=1, size(config%materials))]
-    first = scene%particles
-    if (allocated(variation%friction_angle)) then
-      call set_friction_angle(scene%materials, variation%material, variation%friction_angle, first)
-    end if
-    call take_particles(first, kernel_origin(config), solver%particles)
+    call place_points(config, scene, variation, solver%particles)
     if (observer%wants_plastic_strain) call solver%particles%track_plastic_strain()
     call solver%configure(config)
     if (config%loading%initial_stress == 'geostatic') then
@@ -225,6 +221,22 @@ contains
       minval(solver%particles%mass))
     call solver%start()
   end subroutine prepare
+
+  !> The points of the scene with the strength of the member, for the kernel. What they are copied
+  !> through is gone before the grid is there.
+  subroutine place_points(config, scene, variation, particles)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    type(variation_t), intent(in) :: variation
+    type(particles_t), intent(out) :: particles
+    type(shown_particles_t) :: first
+
+    first = scene%particles
+    if (allocated(variation%friction_angle)) then
+      call set_friction_angle(scene%materials, variation%material, variation%friction_angle, first)
+    end if
+    call take_particles(first, kernel_origin(config), particles)
+  end subroutine place_points
 
   subroutine start_clock(config, scene, solver, clock)
     type(config_t), intent(in) :: config

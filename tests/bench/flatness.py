@@ -28,7 +28,7 @@ def run(program, case, end_time, scheme):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("build", type=Path, help="for instance build/native")
+    parser.add_argument("build", type=Path, help="for instance build/release")
     parser.add_argument("--scheme", default="usl")
     parser.add_argument("--largest", type=int, default=1600000)
     parser.add_argument("--repeats", type=int, default=5)

@@ -5,7 +5,7 @@
 Runs bench_kernel on input/quickstart.nml (1600 points, homogeneous) up to 0.4 s and up to 0.6 s, while the column
 flows; the difference is the cost of the steps between. Prints the ratio to tests/bench/instructions.json and ends with
 1 when one is above the limit; --record writes that file instead. Compiler and flags are part of the record: with others
-the ratios are printed and not judged. Wants the release preset, because valgrind knows no AVX-512; takes two minutes.
+the ratios are printed and not judged. Wants the portable preset, because valgrind knows no AVX-512; takes two minutes.
 """
 
 import argparse
@@ -48,7 +48,7 @@ def compiler(build):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("build", type=Path, help="for instance build/release")
+    parser.add_argument("build", type=Path, help="for instance build/portable")
     parser.add_argument("--record", action="store_true", help="write the figures as those to compare with")
     parser.add_argument("--limit", type=float, default=1.03, help="largest ratio that passes")
     options = parser.parse_args()

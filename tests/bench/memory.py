@@ -61,7 +61,7 @@ def bytes_of_a_point():
 
 
 def bytes_of_a_node():
-    """Bytes of total(8, ...) and motion(4, ...) of grid_t."""
+    """Bytes of total(8, ...) and motion(8, ...) of grid_t."""
     text = (SOURCE / "sg_grid.f90").read_text()
     counts = re.search(r"total\((\d+), 0:nx, 0:ny\) and motion\((\d+), 0:nx, 0:ny\)", text)
     return 8 * sum(map(int, counts.groups()))

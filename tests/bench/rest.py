@@ -138,7 +138,8 @@ def main():
     for settle, rows in runs.items():
         largest, mean = compare(settle, rows, long, cell)
         for what, values, bounds in (("largest", largest, options.most), ("mean", mean, options.mean)):
-            beyond += [f"{what} {name} {values[name]:.3f} > {most}" for name, most in bounds if values[name] > most]
+            too_large = [(name, most) for name, most in bounds if abs(values[name]) > most]
+            beyond += [f"{what} {name} {values[name]:.3f}, allowed {most}" for name, most in too_large]
     if beyond:
         sys.exit("FAILED: changes by more cells than allowed: " + ", ".join(beyond))
 
