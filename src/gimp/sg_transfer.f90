@@ -98,13 +98,14 @@ contains
     end do
     energy = energy + 0.5_wp*mass*twice
     do p = 1, n
+      node = w%node(p) - 1
       do j = 1, 3
-        node = w%i(p) + (w%j(p) + j - 1)*(x_axis%last + 1) - 1
         at_point = w%sy(p, j)*mass*dy(p, j)*gradient(3:4, p)
         along_x = w%sy(p, j)*mass*gradient(1:2, p)
         do i = 1, 3
           total(2:3, node + i) = total(2:3, node + i) + w%sx(p, i)*(at_point + dx(p, i)*along_x)
         end do
+        node = node + x_axis%last + 1
       end do
     end do
   end subroutine map_gradient
@@ -234,11 +235,12 @@ contains
     integer :: p, i, j, node
 
     do p = 1, n
+      node = w%node(p) - 1
       do j = 1, 3
-        node = w%i(p) + (w%j(p) + j - 1)*(nx + 1) - 1
         do i = 1, 3
           total(5:6, node + i) = total(5:6, node + i) + w%sx(p, i)*w%sy(p, j)*mass*[bx(p), by(p)]
         end do
+        node = node + nx + 1
       end do
     end do
   end subroutine map_body_force

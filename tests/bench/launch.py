@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -27,6 +28,24 @@ def on_ranks(ranks, command, mpiexec="mpirun"):
     return [mpiexec, "-n", str(ranks), *command]
 
 
+def member_columns(directory, names):
+    """Columns of all members of a run, {case: {name: [members]}}."""
+    with h5py.File(Path(directory) / "ensemble.h5") as file:
+        return {label: {name: group[name][:] for name in names} for label, group in file["cases"].items()}
+
+
+def run_members(options, namelist, directory, names):
+    """Runs or resumes a namelist with the executable and on the ranks of `options`; its member_columns. Failed members
+    (exit code 4) are the caller's business, other failures end the script."""
+    command = [options.executable, namelist, "--output", directory]
+    if options.ranks > 1:
+        command = on_ranks(options.ranks, command, options.mpiexec)
+    code = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, env=environment()).returncode
+    if code not in (0, 4):
+        sys.exit(f"{' '.join(map(str, command))}: exit code {code}")
+    return member_columns(directory, names)
+
+
 def timed_run(command, directory, ranks, mpiexec="mpirun"):
     """Runs sgimp in `directory` from the start, under mpirun on one rank too. Wall time from mpirun to its end in s,
     and the wall times of the members by case, {label: [members]}."""
@@ -34,5 +53,4 @@ def timed_run(command, directory, ranks, mpiexec="mpirun"):
     start = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
     wall = time.perf_counter() - start
-    with h5py.File(Path(directory) / "ensemble.h5") as file:
-        return wall, {label: group["seconds"][:] for label, group in file["cases"].items()}
+    return wall, {label: columns["seconds"] for label, columns in member_columns(directory, ["seconds"]).items()}

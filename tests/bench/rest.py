@@ -10,14 +10,12 @@ fields, the standard deviation of their runouts, the noise floor, is told for co
 """
 
 import argparse
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-import h5py
 import numpy as np
-from launch import environment, on_ranks
+from launch import run_members
 from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
@@ -59,12 +57,7 @@ def run(options, scratch, settle):
     name = "long" if settle == 0 else f"settle_{settle:g}"
     namelist = scratch / f"{name}.nml"
     write_changed(options.case, changes, namelist)
-    command = [options.executable, namelist, "--output", scratch / name]
-    if options.ranks > 1:
-        command = on_ranks(options.ranks, command, options.mpiexec)
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=environment())
-    with h5py.File(scratch / name / "ensemble.h5") as file:
-        cases = {label: {c: group[c][:] for c in COLUMNS} for label, group in file["cases"].items()}
+    cases = run_members(options, namelist, scratch / name, COLUMNS)
     rows = {c: np.concatenate([case[c] for case in cases.values()]) for c in COLUMNS}
     rows["case"] = np.repeat(list(cases), [len(case["status"]) for case in cases.values()])
     if (rows["status"] != 0).any():

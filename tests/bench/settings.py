@@ -14,14 +14,12 @@ Run it again with the same --scratch and it goes on where it was stopped.
 """
 
 import argparse
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-import h5py
 import numpy as np
-from launch import environment, on_ranks
+from launch import run_members
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "verification"))
 from runner import write_changed
@@ -77,12 +75,7 @@ def run(options, scratch, name, changes):
     directory = scratch / name
     namelist = directory.with_suffix(".nml")
     write_changed(options.case, changes, namelist)
-    command = on_ranks(options.ranks, [options.executable, namelist, "--output", directory], options.mpiexec)
-    done = subprocess.run(command, check=False, stdout=subprocess.DEVNULL, env=environment())
-    if done.returncode not in (0, 4):  # 4: complete, with failed members, which are told
-        sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}")
-    with h5py.File(directory / "ensemble.h5") as file:
-        return {label: {c: group[c][:] for c in COLUMNS} for label, group in file["cases"].items()}
+    return run_members(options, namelist, directory, COLUMNS)
 
 
 def compare(label, first, second, noise):
