@@ -5,7 +5,7 @@ module sg_materials
   implicit none
   private
 
-  public :: material_t, create_material, mohr_coulomb_strength
+  public :: material_t, create_material, cone_strength, mohr_coulomb_strength
   public :: MODEL_LINEAR_ELASTIC, MODEL_NEO_HOOKEAN, MODEL_MOHR_COULOMB, MODEL_DRUCKER_PRAGER
 
   integer, parameter :: MODEL_LINEAR_ELASTIC = 1
@@ -28,6 +28,8 @@ module sg_materials
     !> Lame's first constant, shear and bulk modulus, in Pa.
     real(wp) :: lame, shear, bulk
     real(wp) :: poisson
+    !> Young's modulus in Pa.
+    real(wp) :: young
     !> Mohr-Coulomb: friction and dilation angle in degrees, sine of the latter, cohesion and
     !> tension strength in Pa.
     real(wp) :: friction_angle = 0.0_wp, dilation_angle = 0.0_wp, sin_dilation = 0.0_wp
@@ -41,8 +43,12 @@ module sg_materials
     !> A point at the apex carries tension, which it loses once it is open.
     logical :: is_brittle = .false.
     !> Drucker-Prager: f = sqrt(J2) + alpha I1 - k, flow with alpha_flow, mean stress at most
-    !> mean_limit; k and mean_limit in Pa.
+    !> mean_limit; k and mean_limit in Pa. k is k_per_cohesion times the cohesion, or the undrained
+    !> strength.
     real(wp) :: alpha = 0.0_wp, alpha_flow = 0.0_wp, k = 0.0_wp, mean_limit = 0.0_wp
+    real(wp) :: k_per_cohesion = 0.0_wp
+    !> The cohesion is an undrained strength (Tresca, von Mises).
+    logical :: is_undrained = .false.
     !> Work that is asked for although points can do without it (docs/skips.md): gaps are closed
     !> where there is none, the multiplier is divided for without dilation.
     logical :: closes_all_gaps = .false., divides_always = .false.
@@ -62,6 +68,7 @@ contains
     shear = config%young/(2.0_dp*(1.0_dp + config%poisson))
     material%density = real(config%density, wp)
     material%poisson = real(config%poisson, wp)
+    material%young = real(config%young, wp)
     material%lame = real(lame, wp)
     material%shear = real(shear, wp)
     material%bulk = real(lame + 2.0_dp/3.0_dp*shear, wp)
@@ -86,14 +93,19 @@ contains
       ! In plane strain the out-of-plane stress settles midway, where sqrt(J2) is half the
       ! difference of the other two.
       material%model = MODEL_DRUCKER_PRAGER
+      material%cohesion = real(config%undrained_strength, wp)
       material%k = real(config%undrained_strength, wp)
-      material%mean_limit = real(UNLIMITED*config%undrained_strength, wp)
+      material%k_per_cohesion = 1.0_wp
+      material%tension_strength = real(UNLIMITED*config%undrained_strength, wp)
+      material%mean_limit = material%tension_strength
     case ('neo_hookean')
       material%model = MODEL_NEO_HOOKEAN
     case default
       material%model = MODEL_LINEAR_ELASTIC
     end select
-    material%is_brittle = material%tension_strength > 0.0_wp .or. material%mean_limit > 0.0_wp
+    material%is_undrained = config%model == 'tresca' .or. config%model == 'von_mises'
+    material%is_brittle = merge(material%mean_limit, material%tension_strength, &
+      material%model == MODEL_DRUCKER_PRAGER) > 0.0_wp
   end function create_material
 
   pure subroutine set_softening(config, material)
@@ -148,8 +160,11 @@ contains
     material%sin_dilation = real(sin_dilation, wp)
     material%alpha_flow = real(flow, wp)
     material%alpha = real(s/q, wp)
+    material%cohesion = real(config%cohesion, wp)
     material%k = real(3.0_dp*config%cohesion*cos(config%friction_angle*DEGREE)/q, wp)
-    material%mean_limit = real(config%tension_strength, wp)
+    material%k_per_cohesion = real(3.0_dp*cos(config%friction_angle*DEGREE)/q, wp)
+    material%tension_strength = real(config%tension_strength, wp)
+    material%mean_limit = material%tension_strength
     if (material%k < 3.0_wp*material%alpha*material%mean_limit) then
       material%mean_limit = material%k/(3.0_wp*material%alpha)
     end if
@@ -173,4 +188,16 @@ contains
       tension_limit = cohesion_term/(2.0_wp*sin_friction)
     end if
   end subroutine mohr_coulomb_strength
+
+  !> Strength of a Drucker-Prager point with `cohesion` (von Mises: undrained strength) in Pa: k and
+  !> the largest mean stress, min(tension strength, k/(3 alpha)), in Pa.
+  elemental subroutine cone_strength(material, cohesion, k, mean_limit)
+    type(material_t), intent(in) :: material
+    real(wp), intent(in) :: cohesion
+    real(wp), intent(out) :: k, mean_limit
+
+    k = material%k_per_cohesion*cohesion
+    mean_limit = material%tension_strength
+    if (k < 3.0_wp*material%alpha*mean_limit) mean_limit = k/(3.0_wp*material%alpha)
+  end subroutine cone_strength
 end module sg_materials

@@ -50,6 +50,12 @@ contains
     to%fyy = real(from%fyy, wp)
     to%velocity_gradient = real(from%velocity_gradient, wp)
     to%friction_angle = real(from%friction_angle, wp)
+    to%cohesion = real(from%cohesion, wp)
+    to%undrained_strength = real(from%undrained_strength, wp)
+    to%young = real(from%young, wp)
+    to%density = real(from%density, wp)
+    to%dilation_angle = real(from%dilation_angle, wp)
+    to%sin_dilation = real(from%sin_dilation, wp)
     to%plastic_strain = real(from%plastic_strain, wp)
   end subroutine take_particles
 
@@ -90,6 +96,12 @@ contains
     to%fyy = real(from%fyy, dp)
     to%velocity_gradient = real(from%velocity_gradient, dp)
     to%friction_angle = real(from%friction_angle, dp)
+    to%cohesion = real(from%cohesion, dp)
+    to%undrained_strength = real(from%undrained_strength, dp)
+    to%young = real(from%young, dp)
+    to%density = real(from%density, dp)
+    to%dilation_angle = real(from%dilation_angle, dp)
+    to%sin_dilation = real(from%sin_dilation, dp)
     to%plastic_strain = real(from%plastic_strain, dp)
   end subroutine show_particles
 end module sg_particle_copy

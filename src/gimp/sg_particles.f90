@@ -29,8 +29,8 @@ module sg_particles
     real(wp), allocatable :: x(:), y(:), vx(:), vy(:)
     !> Initial position, [count], in m.
     real(wp), allocatable :: x_start(:), y_start(:)
-    !> Mass in kg/m, the same for all points of a body, and current volume in m^2 (per metre of
-    !> thickness), [count].
+    !> Mass in kg/m, the same for all points of a body unless their density varies, and current
+    !> volume in m^2 (per metre of thickness), [count].
     real(wp), allocatable :: mass(:), volume(:)
     !> Full width and height of the domain of a point, [count], in m; they change with cpGIMP only.
     real(wp), allocatable :: width(:), height(:)
@@ -40,14 +40,22 @@ module sg_particles
     real(wp), allocatable :: gap(:)
     !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the
     !> largest principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
+    !> Drucker-Prager points whose strength varies have their k and limit of mean stress here.
     real(wp), allocatable :: sin_friction(:), cohesion_term(:), tension_limit(:)
     !> Deformation gradient, [count]; size 0 where neither material nor weights need it.
     real(wp), allocatable :: fxx(:), fxy(:), fyx(:), fyy(:)
     !> Gradient of the velocity, [4, count], in 1/s: d vx/dx, d vy/dx, d vx/dy, d vy/dy; size 0 but
     !> for transfers that carry it.
     real(wp), allocatable :: velocity_gradient(:, :)
-    !> Friction angle as it was given, [count], in degrees; for output only.
+    !> Friction angle as it was given, [count], in degrees; for softening and output.
     real(wp), allocatable :: friction_angle(:)
+    !> Properties that the member varies, [count]: Pa, kg/m^3 and degrees (the dilation angle at
+    !> most the friction angle), not a number where the material has no such property. Size 0 for
+    !> what is the same in each material, which is then the one to ask.
+    real(wp), allocatable :: cohesion(:), undrained_strength(:), young(:), density(:)
+    real(wp), allocatable :: dilation_angle(:)
+    !> Sine of that dilation angle, [count] or size 0.
+    real(wp), allocatable :: sin_dilation(:)
     !> Equivalent deviatoric plastic strain, [count]; size 0 where no material needs it and nobody
     !> asked for it.
     real(wp), allocatable :: plastic_strain(:)
@@ -77,6 +85,8 @@ contains
     allocate (this%width(count), this%height(count))
     allocate (this%velocity_gradient(4, 0))
     allocate (this%plastic_strain(0), this%fxx(0), this%fxy(0), this%fyx(0), this%fyy(0))
+    allocate (this%cohesion(0), this%undrained_strength(0), this%young(0), this%density(0))
+    allocate (this%dilation_angle(0), this%sin_dilation(0))
     this%x = 0.0_wp; this%y = 0.0_wp; this%vx = 0.0_wp; this%vy = 0.0_wp
     this%x_start = 0.0_wp; this%y_start = 0.0_wp; this%mass = 0.0_wp; this%volume = 0.0_wp
     this%sxx = 0.0_wp; this%syy = 0.0_wp; this%szz = 0.0_wp; this%sxy = 0.0_wp

@@ -73,6 +73,7 @@ contains
       if (.not. particles%bodies(body)%is_measured) cycle
       density = materials(particles%bodies(body)%material)%density
       do p = particles%bodies(body)%first, particles%bodies(body)%last
+        if (size(particles%density) > 0) density = particles%density(p)
         k = floor((particles%origin(1) + particles%x(p) - x_min)/column_width) + 1
         if (k >= 1 .and. k <= columns) total(k) = total(k) &
           + particles%mass(p)/(density*column_width)
@@ -120,7 +121,8 @@ contains
   pure function elastic_energy(particles, materials) result(energy)
     type(particles_t), intent(in) :: particles
     type(material_t), intent(in) :: materials(:)
-    real(dp) :: energy, trace
+    real(dp) :: energy, trace, volume
+    real(wp), allocatable :: mass(:)
     integer :: body, p
 
     energy = 0.0_dp
@@ -128,7 +130,11 @@ contains
       associate (s => particles, material => materials(particles%bodies(body)%material))
         if (material%model == MODEL_NEO_HOOKEAN) then
           associate (first => s%bodies(body)%first, last => s%bodies(body)%last)
-            energy = energy + sum(s%mass(first:last)*neo_hookean_energy( &
+            ! Mass stands for the first volume, and energy is proportional to the modulus.
+            mass = s%mass(first:last)
+            if (size(s%density) > 0) mass = mass*(material%density/s%density(first:last))
+            if (size(s%young) > 0) mass = mass*(s%young(first:last)/material%young)
+            energy = energy + sum(mass*neo_hookean_energy( &
               real(material%lame, dp), real(material%shear, dp), real(s%fxx(first:last), dp), &
               real(s%fxy(first:last), dp), real(s%fyx(first:last), dp), &
               real(s%fyy(first:last), dp)))/material%density
@@ -137,7 +143,9 @@ contains
         end if
         do p = particles%bodies(body)%first, particles%bodies(body)%last
           trace = real(s%sxx(p), dp) + s%syy(p) + s%szz(p)
-          energy = energy + s%volume(p)*(trace**2/(18.0_wp*material%bulk) &
+          volume = s%volume(p)
+          if (size(s%young) > 0) volume = volume*(material%young/s%young(p))
+          energy = energy + volume*(trace**2/(18.0_wp*material%bulk) &
             + ((s%sxx(p) - trace/3.0_dp)**2 + (s%syy(p) - trace/3.0_dp)**2 + (s%szz(p) &
             - trace/3.0_dp)**2 &
             + 2.0_wp*s%sxy(p)**2)/(4.0_wp*material%shear))

@@ -7,13 +7,19 @@ module sg_scene
   use sg_initial_stress, only: set_geostatic_stress
   use sg_kinds, only: wp
   use sg_manufactured, only: manufactured_velocity
-  use sg_materials, only: create_material, material_t, MODEL_MOHR_COULOMB, mohr_coulomb_strength
-  use sg_particles, only: particles_t
+  use sg_materials, only: cone_strength, create_material, material_t, MODEL_DRUCKER_PRAGER, &
+    MODEL_MOHR_COULOMB, mohr_coulomb_strength
+  use sg_particles, only: body_points_t, particles_t
+  use sg_property, only: PROPERTY_COHESION, PROPERTY_DENSITY, PROPERTY_DILATION_ANGLE, &
+    PROPERTY_FRICTION_ANGLE, PROPERTY_UNDRAINED_STRENGTH, PROPERTY_YOUNG
   use sg_text, only: to_text
+  use sg_variation, only: property_values_t
   implicit none
   private
 
-  public :: scene_t, build_scene, set_friction_angle
+  public :: scene_t, build_scene, set_properties
+
+  real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
   type :: scene_t
     type(material_t), allocatable :: materials(:)
@@ -53,7 +59,7 @@ contains
   end function point_count
 
   !> Initial places of the points of a material, [point_count], in m and in the order of
-  !> set_friction_angle.
+  !> property_values_t.
   pure subroutine points_of(this, material, x, y)
     class(scene_t), intent(in) :: this
     integer, intent(in) :: material
@@ -184,41 +190,126 @@ contains
     end associate
   end subroutine place_body
 
-  !> Gives the points of `material` their friction angles, [number of such points in order], in
-  !> degrees.
-  subroutine set_friction_angle(materials, material, friction_angle, particles)
+  !> Gives points the `properties` of a member. With their density changes the stress of the ground,
+  !> where `config` asks for it.
+  subroutine set_properties(config, materials, properties, particles)
+    type(config_t), intent(in) :: config
     type(material_t), intent(in) :: materials(:)
-    integer, intent(in) :: material
-    real(wp), intent(in) :: friction_angle(:)
+    type(property_values_t), intent(in) :: properties(:)
     type(particles_t), intent(inout) :: particles
-    integer :: body, done, count
+    integer :: k
 
-    done = 0
-    do body = 1, size(particles%bodies)
-      associate (b => particles%bodies(body))
-        if (b%material /= material) cycle
-        count = b%last - b%first + 1
-        particles%friction_angle(b%first:b%last) = friction_angle(done + 1:done + count)
-        done = done + count
+    do k = 1, size(properties)
+      associate (p => particles, one => properties(k))
+        select case (one%property)
+        case (PROPERTY_FRICTION_ANGLE)
+          call place_values(materials, p%bodies, one, p%friction_angle)
+        case (PROPERTY_COHESION)
+          call place_values(materials, p%bodies, one, p%cohesion)
+        case (PROPERTY_UNDRAINED_STRENGTH)
+          call place_values(materials, p%bodies, one, p%undrained_strength)
+        case (PROPERTY_YOUNG)
+          call place_values(materials, p%bodies, one, p%young)
+        case (PROPERTY_DENSITY)
+          call place_values(materials, p%bodies, one, p%density)
+        case default ! PROPERTY_DILATION_ANGLE
+          call place_values(materials, p%bodies, one, p%dilation_angle)
+        end select
       end associate
     end do
     call set_strength(materials, particles)
-  end subroutine set_friction_angle
+    if (size(particles%dilation_angle) > 0) then
+      ! A point whose dilation angle is above its friction angle would give energy back as it flows.
+      particles%dilation_angle = min(particles%dilation_angle, particles%friction_angle)
+      particles%sin_dilation = sin(particles%dilation_angle*DEGREE)
+    end if
+    if (size(particles%density) > 0) then
+      particles%mass = particles%volume*particles%density
+      if (config%loading%initial_stress == 'geostatic') then
+        call set_geostatic_stress(particles, materials, config%loading%gravity)
+      end if
+    end if
+  end subroutine set_properties
 
-  !> Strength of all Mohr-Coulomb points from their friction angle.
+  !> Puts the values of `one` into `field`, [number of points], which has those of the materials
+  !> before, and is made if it has size 0.
+  subroutine place_values(materials, bodies, one, field)
+    type(material_t), intent(in) :: materials(:)
+    type(body_points_t), intent(in) :: bodies(:)
+    type(property_values_t), intent(in) :: one
+    real(wp), allocatable, intent(inout) :: field(:)
+    integer :: body, done, count
+
+    if (size(field) == 0) then
+      deallocate (field)
+      allocate (field(bodies(size(bodies))%last))
+      do body = 1, size(bodies)
+        field(bodies(body)%first:bodies(body)%last) = &
+          value_of(materials(bodies(body)%material), one%property)
+      end do
+    end if
+    done = 0
+    do body = 1, size(bodies)
+      associate (b => bodies(body))
+        if (b%material /= one%material) cycle
+        count = b%last - b%first + 1
+        field(b%first:b%last) = one%values(done + 1:done + count)
+        done = done + count
+      end associate
+    end do
+  end subroutine place_values
+
+  !> What a material says of a property; not a number where it has none.
+  function value_of(material, property) result(value)
+    type(material_t), intent(in) :: material
+    integer, intent(in) :: property
+    real(wp) :: value
+
+    value = ieee_value(1.0_wp, ieee_quiet_nan)
+    select case (property)
+    case (PROPERTY_YOUNG)
+      value = material%young
+    case (PROPERTY_DENSITY)
+      value = material%density
+    case (PROPERTY_FRICTION_ANGLE)
+      if (material%model == MODEL_MOHR_COULOMB) value = material%friction_angle
+    case (PROPERTY_DILATION_ANGLE)
+      if (material%model == MODEL_MOHR_COULOMB) value = material%dilation_angle
+    case (PROPERTY_COHESION)
+      if (any(material%model == [MODEL_MOHR_COULOMB, MODEL_DRUCKER_PRAGER]) &
+        .and. .not. material%is_undrained) value = material%cohesion
+    case default ! PROPERTY_UNDRAINED_STRENGTH
+      if (material%is_undrained) value = material%cohesion
+    end select
+  end function value_of
+
+  !> Strength of all Mohr-Coulomb points, and of Drucker-Prager ones where strength varies, from
+  !> their friction angle and cohesion.
   subroutine set_strength(materials, particles)
     type(material_t), intent(in) :: materials(:)
     type(particles_t), intent(inout) :: particles
+    real(wp), allocatable :: cohesion(:)
     integer :: body
 
     do body = 1, size(particles%bodies)
-      associate (b => particles%bodies(body))
-        if (materials(b%material)%model /= MODEL_MOHR_COULOMB) cycle
-        call mohr_coulomb_strength(materials(b%material), &
-          particles%friction_angle(b%first:b%last), materials(b%material)%cohesion, &
-                                   particles%sin_friction(b%first:b%last), &
-                                   particles%cohesion_term(b%first:b%last), &
-                                   particles%tension_limit(b%first:b%last))
+      associate (p => particles, first => particles%bodies(body)%first, &
+        last => particles%bodies(body)%last, material => materials(particles%bodies(body)%material))
+        allocate (cohesion(last - first + 1), source=material%cohesion)
+        if (material%is_undrained) then
+          if (size(p%undrained_strength) > 0) cohesion = p%undrained_strength(first:last)
+        else if (size(p%cohesion) > 0) then
+          cohesion = p%cohesion(first:last)
+        end if
+        select case (material%model)
+        case (MODEL_MOHR_COULOMB)
+          call mohr_coulomb_strength(material, p%friction_angle(first:last), cohesion, &
+            p%sin_friction(first:last), p%cohesion_term(first:last), p%tension_limit(first:last))
+        case (MODEL_DRUCKER_PRAGER)
+          call cone_strength(material, cohesion, p%cohesion_term(first:last), &
+            p%tension_limit(first:last))
+        case default ! elastic
+        end select
+        deallocate (cohesion)
       end associate
     end do
   end subroutine set_strength

@@ -19,7 +19,7 @@ module sg_simulation
   use sg_particle_copy, only: show_particles, take_particles
   use sg_runout, only: angular_momentum, connected_front, deposit_depth, elastic_energy, &
     farthest_edge, mass_front, potential_energy, surface_height
-  use sg_scene, only: scene_t, set_friction_angle
+  use sg_scene, only: scene_t, set_properties
   use sg_solver, only: solver_t
   use sg_text, only: to_text
   use sg_timer, only: wall_seconds
@@ -70,6 +70,10 @@ module sg_simulation
     integer :: shown_step = -1
     real(dp) :: time = 0.0_dp, time_step = 0.0_dp
     real(dp) :: peak_energy = 0.0_dp, speed_limit = 0.0_dp
+    !> Of the member, whose modulus and density may not be those of the scene: fastest compression
+    !> wave and the mean speed at which one crosses a body, m/s; mass, kg/m; and the time step that
+    !> the CFL number allows at the start, or the fixed one, s.
+    real(dp) :: wave_speed = 0.0_dp, mean_wave_speed = 0.0_dp, mass = 0.0_dp, first_step = 0.0_dp
     real(dp) :: calm_since = 0.0_dp, calm_needed = 0.0_dp
     !> Farthest point when the calm began, in m; the speed below which it counts as still, in m/s.
     real(dp) :: calm_front = 0.0_dp, still_speed = 0.0_dp
@@ -176,10 +180,11 @@ contains
     solver%particles%vy = 0.0_wp
     call solver%grid%clear()
     call solver%start()
-    solver%damping = real(acos(-1.0_dp)*scene%wave_speed/(scene%extent(4) - scene%extent(3)), wp)
     if (config%loading%relaxation == 'gated') call solver%grid%set_gate(scene%toe &
       - solver%particles%origin(1))
     call start_clock(stage, scene, solver, clock)
+    solver%damping = real(acos(-1.0_dp)*clock%mean_wave_speed/(scene%extent(4) &
+      - scene%extent(3)), wp)
     is_shown = observer%wants_ends .and. variation%last_relaxation_step < huge(1)
     if (is_shown) call show_state(solver, observer, clock)
     call march(stage, scene, whole, monitor, nobody, solver, clock, outcome)
@@ -222,7 +227,7 @@ contains
     call solver%start()
   end subroutine prepare
 
-  !> The points of the scene with the strength of the member, for the kernel. What they are copied
+  !> The points of the scene with the properties of the member, for the kernel. What they are copied
   !> through is gone before the grid is there.
   subroutine place_points(config, scene, variation, particles)
     type(config_t), intent(in) :: config
@@ -232,8 +237,8 @@ contains
     type(shown_particles_t) :: first
 
     first = scene%particles
-    if (allocated(variation%friction_angle)) then
-      call set_friction_angle(scene%materials, variation%material, variation%friction_angle, first)
+    if (allocated(variation%properties)) then
+      call set_properties(config, scene%materials, variation%properties, first)
     end if
     call take_particles(first, kernel_origin(config), particles)
   end subroutine place_points
@@ -245,14 +250,15 @@ contains
     type(clock_t), intent(inout) :: clock
     real(dp) :: fall
 
+    call measure_member(config, scene, solver, clock)
     clock%peak_energy = solver%tally%kinetic_energy ! at the start both are the same
     clock%calm_needed = SETTLE_PERIODS*4.0_dp*max(scene%extent(2) - scene%extent(1), &
-      scene%extent(4) - scene%extent(3))/scene%wave_speed
+      scene%extent(4) - scene%extent(3))/clock%mean_wave_speed
     clock%calm_front = solver%tally%x_max
     clock%still_speed = STILL*sqrt(norm2(config%loading%gravity)*config%grid%cell_size)
     fall = norm2(config%loading%gravity) &
       *(config%grid%x_max - config%grid%x_min + config%grid%y_max - config%grid%y_min)
-    clock%speed_limit = RUNAWAY_FACTOR*(scene%wave_speed + scene%speed + sqrt(2.0_dp*fall))
+    clock%speed_limit = RUNAWAY_FACTOR*(clock%wave_speed + scene%speed + sqrt(2.0_dp*fall))
     clock%potential_at_start = potential_energy(solver%particles, config%loading%gravity)
     clock%energy_at_start = solver%tally%kinetic_energy + clock%potential_at_start
     clock%elastic_at_start = elastic_energy(solver%particles, solver%materials)
@@ -262,6 +268,40 @@ contains
       clock%steps_per_strain = 1
     end if
   end subroutine start_clock
+
+  !> Wave speeds, mass and first time step: those of the scene, unless modulus or density varies.
+  !> The mean of a body is its points over the sum of their 1/c, the time a wave takes.
+  subroutine measure_member(config, scene, solver, clock)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    type(solver_t), intent(in) :: solver
+    type(clock_t), intent(inout) :: clock
+    real(dp), allocatable :: speed(:)
+    integer :: body
+
+    clock%wave_speed = scene%wave_speed
+    clock%mean_wave_speed = scene%wave_speed
+    clock%mass = scene%mass
+    clock%first_step = scene%first_step
+    if (size(solver%particles%young) + size(solver%particles%density) == 0) return
+    clock%wave_speed = 0.0_dp
+    clock%mean_wave_speed = 0.0_dp
+    clock%mass = sum(real(solver%particles%mass, dp))
+    do body = 1, size(solver%particles%bodies)
+      associate (s => solver%particles, b => solver%particles%bodies(body), &
+        material => scene%materials(solver%particles%bodies(body)%material))
+        allocate (speed(b%last - b%first + 1), source=sqrt((material%lame &
+          + 2.0_dp*material%shear)/material%density))
+        if (size(s%young) > 0) speed = speed*sqrt(s%young(b%first:b%last)/material%young)
+        if (size(s%density) > 0) speed = speed*sqrt(material%density/s%density(b%first:b%last))
+        clock%wave_speed = max(clock%wave_speed, maxval(speed))
+        clock%mean_wave_speed = max(clock%mean_wave_speed, size(speed)/sum(1.0_dp/speed))
+        deallocate (speed)
+      end associate
+    end do
+    if (.not. scene%fixed_step > 0.0_dp) clock%first_step = config%solver%cfl &
+      *config%grid%cell_size/(clock%wave_speed + scene%speed)
+  end subroutine measure_member
 
   !> CFL h/(c + v) with the present wave and point speeds, or the fixed step; never past the end.
   function next_step(config, scene, variation, solver, clock) result(time_step)
@@ -275,10 +315,10 @@ contains
     if (scene%fixed_step > 0.0_dp) then
       time_step = scene%fixed_step
     else
-      ! Points that all float free carry no stress and have no wave speed: then that of the scene
-      ! holds.
+      ! Points that all float free carry no stress and have no wave speed: then that of the first
+      ! state holds.
       time_step = config%solver%cfl*solver%grid%cell_size/(sqrt(solver%tally%speed_squared) &
-        + max(real(sqrt(solver%tally%wave_squared), dp), 0.5_dp*scene%wave_speed))
+        + max(real(sqrt(solver%tally%wave_squared), dp), 0.5_dp*clock%wave_speed))
     end if
     time_step = min(time_step*variation%step_factor, config%solver%end_time - clock%time)
   end function next_step
@@ -324,7 +364,7 @@ contains
         call fail(STATUS_RUNAWAY, p, 'speed of '//to_text(real(sqrt(t%speed_squared), &
           dp), 4)//' m/s is above all that the '// &
                   'scene can explain: the time step is too long')
-      else if (clock%time_step < COLLAPSED_STEP*scene%first_step &
+      else if (clock%time_step < COLLAPSED_STEP*clock%first_step &
         .and. clock%time < config%solver%end_time) then
         p = maxloc(s%volume/s%mass, dim=1)
         call fail(STATUS_STEP_COLLAPSE, p, 'time step fell to '//to_text(clock%time_step, 4)//' s')
@@ -355,12 +395,12 @@ contains
         solver%materials) + solver%damping_work - clock%given
       clock%least_energy = min(clock%least_energy, energy)
       scale = energy_scale(potential, solver, clock)
-      rounding = ENERGY_ROUNDING*(abs(potential) + scene%wave_speed**2*scene%mass)
+      rounding = ENERGY_ROUNDING*(abs(potential) + clock%wave_speed**2*clock%mass)
       created = (energy - clock%least_energy - rounding)/scale
       clock%least_kinetic = solver%tally%kinetic_energy
       clock%notable_rise = MOST_CREATED*scale
       if (.not. created > MOST_CREATED) return
-      most = MOST_CREATED + misread_energy(config, scene, solver) + compression(solver)
+      most = MOST_CREATED + misread_energy(config, solver, clock) + compression(solver)
       if (.not. created > most) return
       call fail(STATUS_ENERGY_CREATED, maxloc(solver%particles%vx**2 + solver%particles%vy**2, &
         dim=1), 'the scheme made energy from nothing, '//to_text(created, 3)//' of what was '// &
@@ -523,10 +563,10 @@ contains
   !> Share of the energy of a swing by which kinetic + elastic energy reads wrong between two looks,
   !> since velocity and stress are known half a step apart: omega dt, where a body swings with
   !> omega = pi c/(2 L) across its shorter side L, of a cell or more.
-  pure function misread_energy(config, scene, solver) result(share)
+  pure function misread_energy(config, solver, clock) result(share)
     type(config_t), intent(in) :: config
-    type(scene_t), intent(in) :: scene
     type(solver_t), intent(in) :: solver
+    type(clock_t), intent(in) :: clock
     real(dp) :: share
     real(dp) :: side
     integer :: body
@@ -540,7 +580,7 @@ contains
       end associate
     end do
     side = max(side, config%grid%cell_size)
-    share = 0.5_dp*acos(-1.0_dp)*scene%wave_speed*scene%first_step/side
+    share = 0.5_dp*acos(-1.0_dp)*clock%mean_wave_speed*clock%first_step/side
   end function misread_energy
 
   !> Share of its volume that the most compressed point has lost, among those whose stress follows
@@ -554,6 +594,11 @@ contains
     do body = 1, size(solver%particles%bodies)
       associate (b => solver%particles%bodies(body), s => solver%particles)
         if (solver%materials(b%material)%model == MODEL_NEO_HOOKEAN) cycle
+        if (size(s%density) > 0) then
+          share = max(share, real(1.0_wp - minval(s%density(b%first:b%last) &
+            *s%volume(b%first:b%last)/s%mass(b%first:b%last)), dp))
+          cycle
+        end if
         share = max(share, 1.0_dp - solver%materials(b%material)%density &
           *minval(s%volume(b%first:b%last)/s%mass(b%first:b%last)))
       end associate
@@ -566,6 +611,7 @@ contains
     integer, intent(out) :: point
     real(dp), intent(out) :: ratio
     real(dp) :: here
+    real(wp) :: density
     integer :: body, p
 
     point = 1
@@ -574,7 +620,9 @@ contains
       do body = 1, size(s%bodies)
         do p = s%bodies(body)%first, s%bodies(body)%last
           if (s%gap(p) > 0.0_dp) cycle
-          here = solver%materials(s%bodies(body)%material)%density*s%volume(p)/s%mass(p)
+          density = solver%materials(s%bodies(body)%material)%density
+          if (size(s%density) > 0) density = s%density(p)
+          here = density*s%volume(p)/s%mass(p)
           if (max(here, 1.0_dp/here) <= max(ratio, 1.0_dp/ratio)) cycle
           ratio = here
           point = p
@@ -618,7 +666,7 @@ contains
         mask=s%is_measured()) < g%x_min + cell)
       v(WALL_TOUCHED) = merge(1.0_dp, 0.0_dp, touched)
       v(ENERGY_ERROR) = energy_imbalance(potential_energy(s, config%loading%gravity), solver, clock)
-      v(MASS_ERROR) = sum(real(s%mass, dp))/scene%mass - 1.0_dp
+      v(MASS_ERROR) = sum(real(s%mass, dp))/clock%mass - 1.0_dp
       angles = pack(real(s%friction_angle, dp), s%is_measured() .and. &
         ieee_is_finite(s%friction_angle))
       if (size(angles) > 0) then

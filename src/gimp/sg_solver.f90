@@ -89,6 +89,7 @@ module sg_solver
     procedure, private :: sweep_stress
     procedure, private :: average_pressure
     procedure, private :: average_block
+    procedure, private :: map_varied
     procedure, private :: push_points
   end type solver_t
 
@@ -133,6 +134,8 @@ contains
     this%gravity = real(config%loading%gravity, wp)
     this%damping = real(config%loading%damping, wp)
     call this%do_needless(config%solver%needless)
+    ! Points may dilate where their material does not.
+    if (size(this%particles%dilation_angle) > 0) this%materials%divides_always = .true.
     if (this%keeps_gradient) call this%particles%carry_gradient()
   end subroutine configure
 
@@ -191,6 +194,8 @@ contains
           value(:last - first + 1, 2) = p%vy(first:last)
           call move_points(last - first + 1, 0.0_wp, 1, value, p%mass(first), &
             p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
+          if (size(p%density) > 0) call add_heavier(last - first + 1, 1, value, &
+            p%mass(first:last), p%vx(first:last), p%vy(first:last), this%tally)
           this%tally%wave_squared = max(this%tally%wave_squared, wave_speed_squared(p, &
             this%materials(p%bodies(body)%material), first, last))
         end associate
@@ -333,12 +338,16 @@ contains
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first), &
           p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
+        if (size(p%density) > 0) call add_heavier(n, sweep%move_with, value, p%mass(first:last), &
+          p%vx(first:last), p%vy(first:last), this%tally)
         ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
         if (this%stretches_domains) call this%stretch_domains(body, first, last)
         call this%find_weights(first, last, w)
       end if
       if (this%averages_cells .and. sweep%map_force) then
         call this%average_block(sweep, first, last, w)
+      else if (size(p%density) > 0) then
+        call this%map_varied(sweep, first, last, w)
       else if (sweep%map_momentum .and. sweep%map_force) then
         call map_momentum_and_force(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
           p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%sxy(first:last), &
@@ -351,7 +360,7 @@ contains
                        p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
       end if
       if (sweep%map_momentum .and. this%carries_gradient) call map_gradient(n, w, &
-        p%mass(first), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
+        p%mass(first:last), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
         g%x, g%y, g%total_store(g%total_start), this%tally%kinetic_energy)
       if (sweep%map_force .and. this%amplitude > 0.0_wp) call this%push_points(time_step, &
         this%materials(body%material), first, last, w)
@@ -371,14 +380,43 @@ contains
     associate (p => this%particles, g => this%grid)
       change(:n) = this%cells%mean(n, p%x(first:last), p%y(first:last)) &
         - 0.5_wp*(p%sxx(first:last) + p%syy(first:last))
-      if (sweep%map_momentum) call map_momentum(n, w, p%mass(first), p%vx(first:last), &
-        p%vy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+      if (sweep%map_momentum .and. size(p%density) > 0) then
+        call this%map_varied(sweep_t(map_momentum=.true.), first, last, w)
+      else if (sweep%map_momentum) then
+        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), g%x%last, &
+          g%y%last, g%total_store(g%total_start))
+      end if
       call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change(:n), p%syy(first:last) &
         + change(:n), p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
     end associate
   end subroutine average_block
 
-  !> Adds the body force of the manufactured solution to the nodes.
+  !> Maps a block whose points may differ in mass: to the nodes, one that is heavier than the first
+  !> by a factor is as one as heavy with weights that are larger by it.
+  subroutine map_varied(this, sweep, first, last, w)
+    class(solver_t), intent(inout) :: this
+    type(sweep_t), intent(in) :: sweep
+    integer, intent(in) :: first, last
+    type(weights_t), intent(in) :: w
+    type(weights_t) :: heavy
+    integer :: n, j
+
+    n = last - first + 1
+    associate (p => this%particles, g => this%grid)
+      if (sweep%map_momentum) then
+        heavy = w
+        do j = 1, 3
+          heavy%sy(:n, j) = w%sy(:n, j)*(p%mass(first:last)/p%mass(first))
+        end do
+        call map_momentum(n, heavy, p%mass(first), p%vx(first:last), p%vy(first:last), g%x%last, &
+          g%y%last, g%total_store(g%total_start))
+      end if
+      if (sweep%map_force) call map_force(n, w, p%volume(first:last), p%sxx(first:last), &
+        p%syy(first:last), p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+    end associate
+  end subroutine map_varied
+
+  !> Adds the body force of the manufactured solution, which knows of one density, to the nodes.
   subroutine push_points(this, time_step, material, first, last, w)
     class(solver_t), intent(inout) :: this
     real(wp), intent(in) :: time_step
@@ -444,6 +482,18 @@ contains
       vy(p) = flip*(vy(p) + value(p, 2)) + (1.0_wp - flip)*value(p, 4)
     end do
   end subroutine update_velocity
+
+  !> What the tally is told by move_points misses where points of a block are not as heavy as the
+  !> first: their differences times v^2/2.
+  pure subroutine add_heavier(n, k, value, mass, vx, vy, tally)
+    integer, intent(in) :: n, k
+    real(wp), intent(in) :: value(BLOCK, 4), mass(n), vx(n), vy(n)
+    type(tally_t), intent(inout) :: tally
+
+    tally%motion_energy = tally%motion_energy + 0.5_wp*sum((mass - mass(1)) &
+      *(value(:n, k)**2 + value(:n, k + 1)**2))
+    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*sum((mass - mass(1))*(vx**2 + vy**2))
+  end subroutine add_heavier
 
   !> x_p += v dt with v = value(:, k:k+1) for points of the same `mass`, kg/m; adds to the tally.
   pure subroutine move_points(n, time_step, k, value, mass, vx, vy, x, y, tally)

@@ -77,8 +77,8 @@ contains
   pure subroutine map_gradient(n, w, mass, x, y, gradient, x_axis, y_axis, total, energy)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
-    !> Of one point, kg/m; [n], m; [4, n], 1/s, in the order of gather_motion_and_gradient.
-    real(wp), intent(in) :: mass, x(n), y(n), gradient(4, n)
+    !> [n], kg/m; [n], m; [4, n], 1/s, in the order of gather_motion_and_gradient.
+    real(wp), intent(in) :: mass(n), x(n), y(n), gradient(4, n)
     type(axis_t), intent(in) :: x_axis, y_axis
     real(wp), intent(inout) :: total(8, 0:(x_axis%last + 1)*(y_axis%last + 1) - 1)
     real(dp), intent(inout) :: energy
@@ -91,17 +91,17 @@ contains
     twice = 0.0_wp
     !$omp simd reduction(+:twice)
     do p = 1, n
-      twice = twice + ((gradient(1, p)**2 + gradient(2, p)**2)*(w%sx(p, 1)*dx(p, 1)**2 &
-        + w%sx(p, 2)*dx(p, 2)**2 + w%sx(p, 3)*dx(p, 3)**2) + (gradient(3, p)**2 &
-        + gradient(4, p)**2)*(w%sy(p, 1)*dy(p, 1)**2 + w%sy(p, 2)*dy(p, 2)**2 &
-        + w%sy(p, 3)*dy(p, 3)**2))
+      twice = twice + mass(p)/mass(1)*((gradient(1, p)**2 + gradient(2, p)**2) &
+        *(w%sx(p, 1)*dx(p, 1)**2 + w%sx(p, 2)*dx(p, 2)**2 + w%sx(p, 3)*dx(p, 3)**2) &
+        + (gradient(3, p)**2 + gradient(4, p)**2)*(w%sy(p, 1)*dy(p, 1)**2 &
+        + w%sy(p, 2)*dy(p, 2)**2 + w%sy(p, 3)*dy(p, 3)**2))
     end do
-    energy = energy + 0.5_wp*mass*twice
+    energy = energy + 0.5_wp*mass(1)*twice
     do p = 1, n
       node = w%node(p) - 1
       do j = 1, 3
-        at_point = w%sy(p, j)*mass*dy(p, j)*gradient(3:4, p)
-        along_x = w%sy(p, j)*mass*gradient(1:2, p)
+        at_point = w%sy(p, j)*mass(p)*dy(p, j)*gradient(3:4, p)
+        along_x = w%sy(p, j)*mass(p)*gradient(1:2, p)
         do i = 1, 3
           total(2:3, node + i) = total(2:3, node + i) + w%sx(p, i)*(at_point + dx(p, i)*along_x)
         end do

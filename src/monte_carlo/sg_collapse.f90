@@ -15,6 +15,7 @@ module sg_collapse
   use sg_snapshot, only: snapshot_name
   use sg_philox, only: FIELD_STREAM, fill_uniform, NOISE_STREAM
   use sg_plan, only: plan_t
+  use sg_property, only: PROPERTY_FRICTION_ANGLE
   use sg_random_field, only: random_field_t
   use sg_recorder, only: recorder_t
   use sg_scene, only: build_scene, scene_t
@@ -214,9 +215,12 @@ contains
     else
       return
     end if
-    variation%material = material
-    allocate (variation%friction_angle(this%scene%point_count(material)))
-    variation%friction_angle = friction
+    allocate (variation%properties(1))
+    associate (one => variation%properties(1))
+      one%property = PROPERTY_FRICTION_ANGLE
+      one%material = material
+      allocate (one%values(this%scene%point_count(material)), source=friction)
+    end associate
   end subroutine vary_homogeneous
 
   !> The friction angles of realization `id`.
@@ -236,10 +240,12 @@ contains
       end do
       call this%fields(k)%set_cov(field, one%cov, error)
       if (allocated(error)) return
-      variation%material = field%material_index
-      allocate (variation%friction_angle(this%scene%point_count(field%material_index)))
+      allocate (variation%properties(1))
+      variation%properties(1)%property = PROPERTY_FRICTION_ANGLE
+      variation%properties(1)%material = field%material_index
+      allocate (variation%properties(1)%values(this%scene%point_count(field%material_index)))
       call this%fields(k)%realize(this%config%monte_carlo%seed, FIELD_STREAM, id, &
-                                  variation%friction_angle, clipped, error)
+                                  variation%properties(1)%values, clipped, error)
     end associate
   end subroutine vary_by_field
 

@@ -12,6 +12,7 @@ program bench_startup
   use sg_outcome, only: outcome_t, reset_outcome, STEPS
   use sg_philox, only: FIELD_STREAM
   use sg_plan, only: create_plan, plan_t
+  use sg_property, only: PROPERTY_FRICTION_ANGLE
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
   use sg_variation, only: variation_t
@@ -88,10 +89,14 @@ contains
     type(variation_t), intent(out) :: variation
     real(wp), intent(out) :: clipped
 
-    variation%material = config%random_field%material_index
-    allocate (variation%friction_angle(model%scene%point_count(variation%material)))
-    call model%fields(1)%realize(config%monte_carlo%seed, FIELD_STREAM, id, &
-      variation%friction_angle, clipped, error)
+    allocate (variation%properties(1))
+    associate (one => variation%properties(1))
+      one%property = PROPERTY_FRICTION_ANGLE
+      one%material = config%random_field%material_index
+      allocate (one%values(model%scene%point_count(one%material)))
+      call model%fields(1)%realize(config%monte_carlo%seed, FIELD_STREAM, id, one%values, &
+        clipped, error)
+    end associate
     call stop_on_error(error)
   end subroutine draw
 

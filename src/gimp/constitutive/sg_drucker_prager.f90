@@ -23,9 +23,11 @@ module sg_drucker_prager
 contains
 
   !> Returns the trial stresses of `n` points in place and adds to the gap of those at the tip.
-  pure subroutine return_drucker_prager(n, material, sxx, syy, szz, sxy, gap)
+  !> `k` and `mean_limit` are those of the points, whatever the material says.
+  pure subroutine return_drucker_prager(n, material, k, mean_limit, sxx, syy, szz, sxy, gap)
     integer, intent(in) :: n
     type(material_t), intent(in) :: material
+    real(wp), intent(in) :: k(n), mean_limit(n)
     !> Pa; gap is a strain.
     real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n), gap(n)
     real(wp) :: mean, dxx, dyy, dzz, q, multiplier, new_mean, new_q, ratio, stiffness, at_limit
@@ -33,20 +35,21 @@ contains
     logical :: limited
 
     stiffness = material%shear + 9.0_wp*material%bulk*material%alpha*material%alpha_flow
-    at_limit = max(material%k - 3.0_wp*material%alpha*material%mean_limit, 0.0_wp)
-    !$omp simd private(mean, dxx, dyy, dzz, q, multiplier, new_mean, new_q, ratio, limited)
+    !$omp simd private(mean, dxx, dyy, dzz, q, multiplier, new_mean, new_q, ratio, limited) &
+    !$omp& private(at_limit)
     do p = 1, n
+      at_limit = max(k(p) - 3.0_wp*material%alpha*mean_limit(p), 0.0_wp)
       mean = (sxx(p) + syy(p) + szz(p))/3.0_wp
       dxx = sxx(p) - mean
       dyy = syy(p) - mean
       dzz = szz(p) - mean
       q = sqrt(0.5_wp*(dxx*dxx + dyy*dyy + dzz*dzz) + sxy(p)*sxy(p))
-      multiplier = max(q + 3.0_wp*material%alpha*mean - material%k, 0.0_wp)/stiffness
+      multiplier = max(q + 3.0_wp*material%alpha*mean - k(p), 0.0_wp)/stiffness
       new_q = q - material%shear*multiplier
       new_mean = mean - 3.0_wp*material%bulk*material%alpha_flow*multiplier
-      limited = new_mean > material%mean_limit
+      limited = new_mean > mean_limit(p)
       new_q = merge(min(q, at_limit), new_q, limited)
-      new_mean = min(new_mean, material%mean_limit)
+      new_mean = min(new_mean, mean_limit(p))
       ratio = new_q/max(q, LEAST_STRESS)
       ! The mean is moved by its change, so that a stress within the cone stays as it is.
       sxx(p) = mean + ratio*dxx + (new_mean - mean)
@@ -54,7 +57,7 @@ contains
       szz(p) = mean + ratio*dzz + (new_mean - mean)
       sxy(p) = ratio*sxy(p)
       gap(p) = gap(p) + merge((mean - new_mean)/material%bulk, 0.0_wp, &
-        limited .and. new_q <= ROUNDING*(abs(mean) + q + material%k))
+        limited .and. new_q <= ROUNDING*(abs(mean) + q + k(p)))
     end do
   end subroutine return_drucker_prager
 end module sg_drucker_prager

@@ -70,18 +70,19 @@ contains
   end function neo_hookean_energy
 
   !> Largest squared wave speed in the present configuration, (m/s)^2: along a principal stretch s,
-  !> (lambda (1 - ln J) + mu (1 + s^2))/rho_0; s^2 <= tr b bounds it.
-  pure function neo_hookean_wave_squared(n, lame, shear, density, fxx, fxy, fyx, fyy) &
+  !> (lambda (1 - ln J) + mu (1 + s^2))/rho_0; s^2 <= tr b bounds it. `ratio`: what a point has
+  !> times that square because its modulus or density is not that of the material.
+  pure function neo_hookean_wave_squared(n, lame, shear, density, ratio, fxx, fxy, fyx, fyy) &
     result(squared)
     integer, intent(in) :: n
-    real(wp), intent(in) :: lame, shear, density, fxx(n), fxy(n), fyx(n), fyy(n)
+    real(wp), intent(in) :: lame, shear, density, ratio(n), fxx(n), fxy(n), fyx(n), fyy(n)
     real(wp) :: squared
     integer :: p
 
     squared = 0.0_wp
     do p = 1, n
-      squared = max(squared, lame*(1.0_wp - log(fxx(p)*fyy(p) - fxy(p)*fyx(p))) + shear*(1.0_wp &
-        + fxx(p)**2 + fxy(p)**2 + fyx(p)**2 + fyy(p)**2))
+      squared = max(squared, ratio(p)*(lame*(1.0_wp - log(fxx(p)*fyy(p) - fxy(p)*fyx(p))) &
+        + shear*(1.0_wp + fxx(p)**2 + fxy(p)**2 + fyx(p)**2 + fyy(p)**2)))
     end do
     squared = squared/density
   end function neo_hookean_wave_squared

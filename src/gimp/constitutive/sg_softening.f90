@@ -18,22 +18,28 @@ module sg_softening
   implicit none
   private
 
-  public :: return_softening, plastic_strain_increment
+  public :: first_strength_t, return_softening, plastic_strain_increment
 
   !> Rounds of the iteration, and the change of kappa at which it ends.
   integer, parameter :: MOST_ROUNDS = 60
   real(wp), parameter :: CONVERGED = 1.0e-14_wp*COARSENESS
   real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
+  !> What the points of a block have before they soften: angles in degrees, Pa, the sine of the
+  !> dilation angle, and Young's modulus over that of the material.
+  type :: first_strength_t
+    real(wp) :: friction_angle(BLOCK), cohesion(BLOCK), dilation_angle(BLOCK), sin_dilation(BLOCK)
+    real(wp) :: stiffness(BLOCK)
+  end type first_strength_t
+
 contains
 
-  !> As return_stress, with strength and dilation from `plastic_strain`, which grows.
-  !> `friction_angle` is the first one of each point in degrees.
-  subroutine return_softening(n, material, friction_angle, plastic_strain, sxx, syy, szz, &
-    sxy, gap)
+  !> As return_stress, with strength and dilation from `plastic_strain`, which grows. A point that
+  !> is weaker than the residual strength of its material from the `first` does not soften.
+  subroutine return_softening(n, material, first, plastic_strain, sxx, syy, szz, sxy, gap)
     integer, intent(in) :: n
     type(material_t), intent(in) :: material
-    real(wp), intent(in) :: friction_angle(n)
+    type(first_strength_t), intent(in) :: first
     real(wp), intent(inout) :: plastic_strain(n), sxx(n), syy(n), szz(n), sxy(n), gap(n)
     real(wp) :: trial(BLOCK, 4), first_gap(n), kappa(n), next(n), change
     integer :: round
@@ -46,14 +52,16 @@ contains
     kappa = plastic_strain
     do round = 1, MOST_ROUNDS
       call return_with(kappa)
-      next = plastic_strain + plastic_strain_increment(n, material%shear, trial, sxx, syy, szz, sxy)
+      next = plastic_strain + plastic_strain_increment(n, material%shear, trial, sxx, syy, szz, &
+        sxy)/first%stiffness(:n)
       change = maxval(abs(next - kappa))
       if (.not. change > CONVERGED) exit
       kappa = next
     end do
     if (change > CONVERGED) then
       call return_with(merge(plastic_strain, kappa, abs(next - kappa) > CONVERGED))
-      next = plastic_strain + plastic_strain_increment(n, material%shear, trial, sxx, syy, szz, sxy)
+      next = plastic_strain + plastic_strain_increment(n, material%shear, trial, sxx, syy, szz, &
+        sxy)/first%stiffness(:n)
     end if
     plastic_strain = next
 
@@ -66,12 +74,13 @@ contains
 
       share = min(max((strain - material%softening_start)/(material%softening_end &
         - material%softening_start), 0.0_wp), 1.0_wp)
-      call mohr_coulomb_strength(material, friction_angle + share*min(0.0_wp, &
-        material%residual_friction_angle - friction_angle), material%cohesion &
-        + share*(material%residual_cohesion - material%cohesion), sin_friction, cohesion_term, &
-        tension_limit)
-      sin_dilation = material%sin_dilation
-      if (material%dilation_end > 0.0_wp) sin_dilation = sin(DEGREE*material%dilation_angle &
+      associate (phi => first%friction_angle(:n), c => first%cohesion(:n))
+        call mohr_coulomb_strength(material, phi + share*min(0.0_wp, &
+          material%residual_friction_angle - phi), c + share*min(0.0_wp, &
+          material%residual_cohesion - c), sin_friction, cohesion_term, tension_limit)
+      end associate
+      sin_dilation = first%sin_dilation(:n)
+      if (material%dilation_end > 0.0_wp) sin_dilation = sin(DEGREE*first%dilation_angle(:n) &
         *max(1.0_wp - strain/material%dilation_end, 0.0_wp))
       sin_dilation = min(sin_dilation, sin_friction)
       sxx = trial(:n, 1)
