@@ -5,7 +5,9 @@ module sg_recorder
   use sg_kinds, only: i4, i8, wp
   use sg_observer, only: history_row_t, observer_t
   use sg_particles, only: particles_t
-  use sg_snapshot, only: history_t, point_state_t, snapshot_t
+  use sg_property, only: PROPERTY_COHESION, PROPERTY_DENSITY, PROPERTY_DILATION_ANGLE, &
+    PROPERTY_NAMES, PROPERTY_UNDRAINED_STRENGTH, PROPERTY_UNITS, PROPERTY_YOUNG
+  use sg_snapshot, only: history_t, point_state_t, snapshot_t, varied_property_t
   implicit none
   private
 
@@ -76,6 +78,12 @@ contains
       state%volume = p%volume
       state%friction_angle = p%friction_angle
       state%plastic_strain = p%plastic_strain
+      allocate (state%varied(0))
+      call add_varied(PROPERTY_COHESION, p%cohesion, state%varied)
+      call add_varied(PROPERTY_UNDRAINED_STRENGTH, p%undrained_strength, state%varied)
+      call add_varied(PROPERTY_YOUNG, p%young, state%varied)
+      call add_varied(PROPERTY_DENSITY, p%density, state%varied)
+      call add_varied(PROPERTY_DILATION_ANGLE, p%dilation_angle, state%varied)
       allocate (state%material(p%count))
       do body = 1, size(p%bodies)
         state%material(p%bodies(body)%first:p%bodies(body)%last) = int(p%bodies(body)%material, i4)
@@ -83,6 +91,23 @@ contains
     end associate
     call this%file%add_state(state)
   end subroutine note_state
+
+  !> Adds a property to those that vary, if it does.
+  subroutine add_varied(property, values, varied)
+    integer, intent(in) :: property
+    !> [np], or size 0.
+    real(wp), intent(in) :: values(:)
+    type(varied_property_t), allocatable, intent(inout) :: varied(:)
+    type(varied_property_t), allocatable :: longer(:)
+
+    if (size(values) == 0) return
+    allocate (longer(size(varied) + 1))
+    longer(:size(varied)) = varied
+    longer(size(longer))%name = trim(PROPERTY_NAMES(property))
+    longer(size(longer))%units = trim(PROPERTY_UNITS(property))
+    longer(size(longer))%values = values
+    call move_alloc(longer, varied)
+  end subroutine add_varied
 
   !> Writes the history, if any, and puts the file in its place.
   subroutine close_record(this, error)

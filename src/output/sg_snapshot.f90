@@ -10,7 +10,13 @@ module sg_snapshot
   implicit none
   private
 
-  public :: snapshot_t, point_state_t, history_t, snapshot_name
+  public :: snapshot_t, point_state_t, varied_property_t, history_t, snapshot_name
+
+  !> A property of the points that the member varies, [np].
+  type :: varied_property_t
+    character(len=:), allocatable :: name, units
+    real(wp), allocatable :: values(:)
+  end type varied_property_t
 
   !> The points at one time; SI units, friction angle in degrees.
   type :: point_state_t
@@ -22,6 +28,8 @@ module sg_snapshot
     real(wp), allocatable :: stress(:, :)
     !> [np]
     real(wp), allocatable :: volume(:), friction_angle(:), plastic_strain(:)
+    !> Those beside the friction angle.
+    type(varied_property_t), allocatable :: varied(:)
     integer(i4), allocatable :: material(:)
   end type point_state_t
 
@@ -94,6 +102,7 @@ contains
     type(point_state_t), intent(in) :: state
     character(len=20) :: digits
     character(len=:), allocatable :: group
+    integer :: k
 
     write (digits, '(i0)') state%step
     if (state%step < 1000000) write (digits, '(i6.6)') state%step
@@ -108,7 +117,11 @@ contains
     call this%file%write(group//'/material', state%material, '1')
     call this%file%write(group//'/friction_angle', state%friction_angle, 'degree')
     call this%file%write(group//'/plastic_strain', state%plastic_strain, '1')
-    this%grids = this%grids//grid_text(this%name//'.h5', group, state%time, size(state%volume))
+    do k = 1, size(state%varied)
+      call this%file%write(group//'/'//state%varied(k)%name, state%varied(k)%values, &
+        state%varied(k)%units)
+    end do
+    this%grids = this%grids//grid_text(this%name//'.h5', group, state)
   end subroutine add_state
 
   subroutine add_history(this, history)
@@ -158,15 +171,15 @@ contains
 
   !> The points of one time as an XDMF grid of vertices. Two components are no vector for ParaView,
   !> which has them as arrays of two numbers all the same.
-  pure function grid_text(file, group, time, points) result(text)
+  pure function grid_text(file, group, state) result(text)
     character(len=*), intent(in) :: file, group
-    real(wp), intent(in) :: time
-    integer, intent(in) :: points
+    type(point_state_t), intent(in) :: state
     character(len=:), allocatable :: text, number
+    integer :: k
 
-    number = to_text(points)
+    number = to_text(size(state%volume))
     text = '<Grid Name="'//group(2:)//'" GridType="Uniform">'//new_line('a')// &
-           '<Time Value="'//to_text(time)//'"/>'//new_line('a')// &
+           '<Time Value="'//to_text(state%time)//'"/>'//new_line('a')// &
            '<Topology TopologyType="Polyvertex" NumberOfElements="'//number// &
            '" NodesPerElement="1"/>'//new_line('a')// &
            '<Geometry GeometryType="XY">'//item('position', number//' 2', 'Float')// &
@@ -177,8 +190,11 @@ contains
            attribute('volume', number, 'Float')// &
            attribute('material', number, 'Int')// &
            attribute('friction_angle', number, 'Float')// &
-           attribute('plastic_strain', number, 'Float')// &
-           '</Grid>'//new_line('a')
+           attribute('plastic_strain', number, 'Float')
+    do k = 1, size(state%varied)
+      text = text//attribute(state%varied(k)%name, number, 'Float')
+    end do
+    text = text//'</Grid>'//new_line('a')
 
   contains
 
