@@ -35,6 +35,7 @@ def analyse(ensemble, primary: str) -> dict:
     return {
         "primary": primary,
         "state": ensemble.state,
+        "sampling": str(ensemble.attributes.get("sampling", "random")),
         "complete": ensemble.is_complete,
         "totals": _totals(ensemble),
         "deterministic": floor,

@@ -12,10 +12,21 @@ from .errors import PostError
 
 
 def main(arguments=None) -> int:
-    """Exit codes: 0, or 2 for bad input."""
+    """Exit codes: 0; 1 for fields that are not what they should be; 2 for bad input."""
     parser = argparse.ArgumentParser(prog="sgimp-post", description=__doc__.splitlines()[0])
     parser.add_argument("--version", action="version", version=f"sgimp-post {__version__}")
     commands = parser.add_subparsers(dest="command", required=True)
+    _add_report(commands)
+    _add_fields(commands)
+    options = parser.parse_args(arguments)
+    try:
+        return options.run(options)
+    except PostError as error:
+        print(f"sgimp-post: {error}", file=sys.stderr)
+        return 2
+
+
+def _add_report(commands):
     report = commands.add_parser(
         "report", help="one offline HTML page with CSV and JSON of every number beside it"
     )
@@ -29,13 +40,50 @@ def main(arguments=None) -> int:
         default="runout_max",
         help="definition that figures and fits use (default runout_max, as the paper)",
     )
-    options = parser.parse_args(arguments)
+    report.set_defaults(run=_report)
+
+
+def _report(options) -> int:
     from .report import write_report  # matplotlib takes a second; --help should not
 
-    try:
-        path = write_report(options.directory, options.output, options.runout)
-    except PostError as error:
-        print(f"sgimp-post: {error}", file=sys.stderr)
-        return 2
-    print(path)
+    print(write_report(options.directory, options.output, options.runout))
     return 0
+
+
+def _add_fields(commands):
+    fields = commands.add_parser(
+        "fields",
+        help="audit, export or compare the random fields, rebuilt from seed and id without the"
+        " program",
+    )
+    fields.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    fields.add_argument(
+        "--members", type=int, metavar="N", help="the first N of each study case (default 200)"
+    )
+    fields.add_argument(
+        "--out", type=Path, metavar="DIR2", help="where the audit goes (default DIR/fields)"
+    )
+    fields.add_argument("--realization", type=int, metavar="I", help="the member to export")
+    fields.add_argument("--study-case", metavar="LABEL", help="its case, where there are several")
+    form = fields.add_mutually_exclusive_group()
+    form.add_argument("--csv", type=Path, metavar="FILE", help="export x, y and values as CSV")
+    form.add_argument("--h5", type=Path, metavar="FILE", help="export as `sgimp --write-fields`")
+    form.add_argument(
+        "--against",
+        type=Path,
+        metavar="FILE",
+        help="compare with FILE.h5 of `sgimp --write-fields`, or with a directory of snapshots",
+    )
+    fields.add_argument(
+        "--tolerance",
+        type=float,
+        default=1e-12,
+        help="largest relative difference that --against accepts (default 1e-12)",
+    )
+    fields.set_defaults(run=_fields)
+
+
+def _fields(options) -> int:
+    from .field_report import run
+
+    return run(options)

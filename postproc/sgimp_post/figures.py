@@ -30,6 +30,10 @@ ACF_COLOURS = {
     "smk": "#009E73",
     "csx": "#CC79A7",
     "bin": "#7A6A00",
+    "matern32": "#E69F00",
+    "matern52": "#56B4E9",
+    "matern": "#000000",
+    "spherical": "#8C4B2F",
 }
 LAW_STYLES = {
     "normal": ("#0072B2", "-"),

@@ -137,6 +137,12 @@ def warnings(summary: dict) -> list:
             " gap"
             f" from the first on, of {totals['done']} done."
         )
+    if summary["sampling"] != "random":
+        found.append(
+            f"The sampling plan is {summary['sampling'].replace('_', ' ')}: members are not"
+            " independent, and the intervals and p values here, which take them to be, do not hold"
+            " for means and exceedance (mostly they are too wide)."
+        )
     if totals["unsettled"]:
         found.append(
             f"{totals['unsettled']} members were still moving at end_time;"
