@@ -1,13 +1,15 @@
 !> What a run would take, without writing anything: `--check`.
 module sg_estimate
+  use sg_collapse, only: open_files
   use sg_config, only: config_t
   use sg_errors, only: error_t
+  use sg_field_properties, only: points_of_materials
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: COLUMN_COUNT, outcome_t, reset_outcome, SECONDS, STEPS
-  use sg_plan, only: plan_t
-  use sg_sampler, only: estimate_sampler_memory
+  use sg_plan, only: plan_t, study_case_t
+  use sg_random_fields, only: random_fields_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
   use sg_text, only: text_of_duration, to_text
@@ -38,7 +40,7 @@ contains
 
     call build_scene(config, scene, error)
     if (allocated(error)) return
-    call describe_field(config, scene, field, error)
+    call describe_field(config, plan, scene, field, error)
     if (allocated(error)) return
     cells_x = nint((config%grid%x_max - config%grid%x_min)/config%grid%cell_size)
     cells_y = nint((config%grid%y_max - config%grid%y_min)/config%grid%cell_size)
@@ -56,6 +58,8 @@ contains
       'time step       '//to_text(scene%first_step, &
       4)//' s at the start; limit h/(c + v) = '//to_text(limit, 4)// &
       ' s, wave speed '//to_text(scene%wave_speed, 4)//' m/s')//line( &
+      'kernel          '//trim(config%solver%scheme)//' with '//trim(config%solver%weighting)// &
+      ' weights in '//trim(config%solver%precision)//' precision')//line( &
       'steps           '//to_text(steps_needed)//' or more to end_time = '// &
       to_text(config%solver%end_time)// &
       ' s, fewer if it comes to rest')//line( &
@@ -79,19 +83,37 @@ contains
     with_break = new_line('a')//text
   end function line
 
-  subroutine describe_field(config, scene, description, error)
+  subroutine describe_field(config, plan, scene, description, error)
     type(config_t), intent(in) :: config
+    type(plan_t), intent(in) :: plan
     type(scene_t), intent(in) :: scene
     character(len=:), allocatable, intent(out) :: description
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: x(:), y(:)
+    type(random_fields_t) :: fields
     integer(i8) :: bytes
+    integer :: k
 
     description = 'none: the run is deterministic'
     if (.not. config%has_random_field) return
-    call scene%points_of(config%random_field%material_index, x, y)
-    call estimate_sampler_memory(trim(config%random_field%method), x, y, bytes, description, error)
+    ! Every case, for what may be wrong with some of them only.
+    do k = 1, size(plan%cases)
+      if (plan%cases(k)%is_homogeneous) cycle
+      call prepare_fields(config, scene, plan%cases(k), fields, error)
+      if (allocated(error)) return
+    end do
+    call fields%estimate(bytes, description, error)
   end subroutine describe_field
+
+  subroutine prepare_fields(config, scene, one, fields, error)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    type(study_case_t), intent(in) :: one
+    type(random_fields_t), intent(out) :: fields
+    type(error_t), allocatable, intent(out) :: error
+
+    call fields%prepare(config, trim(one%acf), one%cov, points_of_materials(scene), error)
+    if (.not. allocated(error)) call open_files(fields, config%monte_carlo%realizations, error)
+  end subroutine prepare_fields
 
   !> Seconds of one step, from the first steps of the homogeneous member.
   function time_step_cost(config, scene) result(step_seconds)

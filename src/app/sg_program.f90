@@ -17,6 +17,7 @@ module sg_program
   use sg_resolved, only: compare_configs, resolved_text
   use sg_text, only: to_text
   use sg_version, only: GIT_HASH, VERSION
+  use sg_write_fields, only: write_fields
   implicit none
   private
 
@@ -73,7 +74,9 @@ contains
     if (allocated(error)) return
     if (options%output /= '') config%output%directory = options%output
     call create_plan(config, plan)
-    if (options%realization > 0) call choose_member(plan, options, case_index, error)
+    if (options%realization > 0 .and. options%write_fields == '') then
+      call choose_member(plan, options, case_index, error)
+    end if
     if (allocated(error)) return
     if (options%check) then
       if (comm%rank() == 0) call say_estimate(comm, config, plan, error)
@@ -83,10 +86,16 @@ contains
       call comm%agree(error)
       return
     end if
-    if (comm%rank() == 0 .or. options%realization == 0) call model%init(config, plan, error)
+    if (comm%rank() == 0 .or. (options%realization == 0 .and. options%write_fields == '')) then
+      call model%init(config, plan, error)
+    end if
     call comm%agree(error)
     if (allocated(error)) return
-    if (options%realization > 0) then
+    if (options%write_fields /= '') then
+      if (comm%rank() == 0) call write_fields(model, options, error)
+      call comm%agree(error)
+      return
+    else if (options%realization > 0) then
       if (comm%rank() == 0) call replay_member(model, options, case_index)
       return
     end if
@@ -96,6 +105,7 @@ contains
     request%case_text = text
     request%resolved = resolved_text(config)
     request%field_method = model%field_method()
+    request%fields = model%field_records()
     request%toe = model%scene%toe
     request%initial_width = model%scene%extent(2) - model%scene%extent(1)
     request%initial_height = model%scene%extent(4) - model%scene%extent(3)

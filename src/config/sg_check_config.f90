@@ -1,12 +1,13 @@
 !> What several keys of a case must satisfy together. A check is made only where all keys it looks
 !> at have passed on their own, so that one mistake gives one fault.
 module sg_check_config
+  use sg_check_desk, only: check_material_name, desk_t
+  use sg_check_random_fields, only: check_random_fields
   use sg_config, only: config_t, EDGE_TOLERANCE
-  use sg_fault_list, only: did_you_mean, fault_list_t, quoted
+  use sg_fault_list, only: fault_list_t, quoted
   use sg_kinds, only: wp
   use sg_namelist, only: namelist_t
   use sg_polygon, only: corners_are_distinct, polygon_area, polygon_is_simple
-  use sg_schema, only: count_words, key_row, KEYS, word_at
   use sg_text, only: to_text
   implicit none
   private
@@ -18,16 +19,6 @@ module sg_check_config
   real(wp), parameter :: WHOLE_TOLERANCE = 1.0e-6_wp
   !> More cells than this do not fit into memory: a misplaced decimal point.
   real(wp), parameter :: MOST_CELLS = 1.0e8_wp
-
-  !> What a check works on.
-  type :: desk_t
-    type(config_t) :: config
-    type(namelist_t) :: nml
-    type(fault_list_t) :: faults
-  contains
-    procedure :: good
-    procedure :: fault
-  end type desk_t
 
 contains
 
@@ -55,42 +46,11 @@ contains
     end do
     call check_loading(desk)
     call check_solver(desk)
-    if (config%has_random_field) call check_random_field(desk)
+    if (config%has_random_field) call check_random_fields(desk)
     if (config%has_study) call check_study(desk)
     call check_output(desk)
     faults = desk%faults
   end subroutine check_config
-
-  !> Whether all the keys (words between blanks) have values: checked ones or defaults.
-  logical function good(this, group, occurrence, names)
-    class(desk_t), intent(in) :: this
-    character(len=*), intent(in) :: group
-    integer, intent(in) :: occurrence
-    character(len=*), intent(in) :: names
-    integer :: g, e, i
-
-    good = .true.
-    g = this%nml%locate(group, occurrence)
-    do i = 1, count_words(names)
-      e = 0
-      if (g > 0) e = this%nml%groups(g)%find(word_at(names, i))
-      if (e > 0) then
-        good = good .and. this%nml%groups(g)%entries(e)%usable
-      else
-        good = good .and. len_trim(KEYS(key_row(group, word_at(names, i)))%default) > 0
-      end if
-    end do
-  end function good
-
-  !> Reports a fault at a key (which may be absent).
-  subroutine fault(this, group, occurrence, key, what)
-    class(desk_t), intent(inout) :: this
-    character(len=*), intent(in) :: group
-    integer, intent(in) :: occurrence
-    character(len=*), intent(in) :: key, what
-
-    call this%faults%add(this%nml%line_of(group, occurrence, key), '&'//group//' '//key, what)
-  end subroutine fault
 
   subroutine check_grid(desk)
     type(desk_t), intent(inout) :: desk
@@ -236,30 +196,6 @@ contains
       end select
     end associate
   end subroutine check_body
-
-  subroutine check_material_name(desk, group, i, name, material_index)
-    type(desk_t), intent(inout) :: desk
-    character(len=*), intent(in) :: group
-    integer, intent(in) :: i
-    character(len=*), intent(in) :: name
-    integer, intent(in) :: material_index
-    character(len=:), allocatable :: hint
-    integer :: j
-
-    if (material_index > 0 .or. size(desk%config%materials) == 0) return
-    ! The name of a material that is itself faulty cannot be compared.
-    do j = 1, size(desk%config%materials)
-      if (.not. desk%good('material', j, 'name')) return
-    end do
-    hint = 'allowed: '//trim(desk%config%materials(1)%name)
-    do j = 2, size(desk%config%materials)
-      hint = hint//', '//trim(desk%config%materials(j)%name)
-    end do
-    if (len(did_you_mean(name, desk%config%materials%name, '')) > 0) then
-      hint = hint//'; '//did_you_mean(name, desk%config%materials%name, '')
-    end if
-    call desk%fault(group, i, 'material', 'there is no material '//quoted(name)//' ('//hint//')')
-  end subroutine check_material_name
 
   !> The box from `low` to `high` lies in the grid. `key` is where a fault is reported.
   subroutine check_inside(desk, i, key, low, high)
@@ -409,84 +345,6 @@ contains
         to_text(solver%end_time))
     end associate
   end subroutine check_solver
-
-  subroutine check_random_field(desk)
-    type(desk_t), intent(inout) :: desk
-    integer :: m, i
-    logical :: is_used
-
-    associate (field => desk%config%random_field)
-      call check_bounds(desk)
-      if (.not. desk%good('random_field', 1, 'material')) return
-      m = field%material_index
-      call check_material_name(desk, 'random_field', 1, field%material, m)
-      if (m == 0) return
-      is_used = .false.
-      do i = 1, size(desk%config%bodies)
-        ! A body whose material is faulty may be meant to be of this one.
-        is_used = is_used .or. desk%config%bodies(i)%material == field%material .or. &
-          desk%config%bodies(i)%material_index == 0 .or. .not. desk%good('body', i, 'material')
-      end do
-      if (.not. is_used) call desk%fault('random_field', 1, 'material', &
-        'no &body is of material '// &
-        quoted(field%material))
-      if (.not. desk%good('material', m, 'model')) return
-      if (desk%config%materials(m)%model /= 'mohr_coulomb') then
-        call desk%fault('random_field', 1, 'material', quoted(field%material)//' is '// &
-          trim(desk%config%materials(m)%model)// &
-          ' and has no friction angle to vary (allowed: a '// &
-          'material with model = ''mohr_coulomb'')')
-        return
-      end if
-      call check_field_and_material(desk, m)
-    end associate
-  end subroutine check_random_field
-
-  !> lower < mean < upper, within what the property can be.
-  subroutine check_bounds(desk)
-    type(desk_t), intent(inout) :: desk
-    !> A friction angle of 90 degrees has no Mohr-Coulomb pyramid.
-    real(wp), parameter :: RIGHT_ANGLE = 90.0_wp
-
-    associate (field => desk%config%random_field)
-      if (desk%good('random_field', 1, 'lower mean')) then
-        if (.not. field%lower < field%mean) call desk%fault('random_field', 1, 'lower', &
-          to_text(field%lower)//' is not below mean = '//to_text(field%mean))
-      end if
-      if (desk%good('random_field', 1, 'mean upper')) then
-        if (.not. field%mean < field%upper) call desk%fault('random_field', 1, 'upper', &
-          to_text(field%upper)//' is not above mean = '//to_text(field%mean))
-      end if
-      if (desk%good('random_field', 1, 'property upper')) then
-        if (.not. field%upper < RIGHT_ANGLE) call desk%fault('random_field', 1, 'upper', &
-          to_text(field%upper)//' is no friction angle (allowed: less than 90 deg)')
-      end if
-    end associate
-  end subroutine check_bounds
-
-  subroutine check_field_and_material(desk, m)
-    type(desk_t), intent(inout) :: desk
-    integer, intent(in) :: m
-
-    associate (field => desk%config%random_field, material => desk%config%materials(m))
-      if (desk%good('random_field', 1, 'mean') .and. desk%good('material', m, &
-        'friction_angle')) then
-        if (field%mean /= material%friction_angle) call desk%fault('random_field', 1, 'mean', &
-          to_text(field%mean)//' differs from friction_angle = '// &
-          to_text(material%friction_angle)// &
-          ' of material '//quoted(material%name)//' (line '// &
-          to_text(desk%nml%line_of('material', m, 'friction_angle'))//'), with which the '// &
-          'homogeneous case runs (allowed: the same value in both)')
-      end if
-      if (desk%good('random_field', 1, 'lower') .and. desk%good('material', m, &
-        'dilation_angle')) then
-        if (material%dilation_angle > field%lower) call desk%fault('random_field', 1, 'lower', &
-          'friction angles down to '//to_text(field%lower)//' fall below dilation_angle = '// &
-          to_text(material%dilation_angle)//' of material '//quoted(material%name)// &
-          ' (allowed: lower of at least dilation_angle)')
-      end if
-    end associate
-  end subroutine check_field_and_material
 
   subroutine check_study(desk)
     type(desk_t), intent(inout) :: desk

@@ -21,12 +21,14 @@ module sg_command_line
     character(len=:), allocatable :: study_case
     !> Directory instead of that of the case file; empty for none.
     character(len=:), allocatable :: output
+    !> File that the random fields are written to, instead of running; empty for none.
+    character(len=:), allocatable :: write_fields
     !> Wall clock limit of the whole run in s; 0 for none.
     real(wp) :: walltime = 0.0_wp
   end type options_t
 
-  character(len=*), parameter :: KNOWN(12) = [character(len=13) :: '--check', '--keys', &
-    '--json', '--defaults', &
+  character(len=*), parameter :: KNOWN(13) = [character(len=14) :: '--check', '--keys', '--json', &
+    '--defaults', '--write-fields', &
     '--realization', '--study-case', '--snapshots', '--output', '--overwrite', '--walltime', &
     '--version', '--help']
 
@@ -43,6 +45,7 @@ contains
     options%keys_group = ''
     options%study_case = ''
     options%output = ''
+    options%write_fields = ''
     k = 1
     do while (k <= size(words) .and. .not. allocated(error))
       call take_word(words, k, options, error)
@@ -57,8 +60,11 @@ contains
     if (options%keys .or. options%defaults) return
     if (options%case_file == '') then
       call fail('no case file given. Usage: sgimp CASE.nml [options]; see sgimp --help', error)
-    else if (options%realization == 0 .and. (options%snapshots .or. options%study_case /= '')) then
-      call fail('--snapshots and --study-case belong to --realization', error)
+    else if (options%realization == 0 .and. options%snapshots) then
+      call fail('--snapshots belongs to --realization', error)
+    else if (options%realization == 0 .and. options%study_case /= '' .and. &
+      options%write_fields == '') then
+      call fail('--study-case belongs to --realization or --write-fields', error)
     end if
   end subroutine parse_command_line
 
@@ -77,7 +83,7 @@ contains
     if (index(option, '--') == 1) equals = index(option, '=')
     if (equals > 0) option = option(:equals - 1)
     select case (option)
-    case ('--study-case', '--output', '--realization', '--walltime')
+    case ('--study-case', '--output', '--realization', '--walltime', '--write-fields')
       if (equals > 0) then
         call take_value(option, trim(words(k) (equals + 1:)), options, error)
       else if (k == size(words)) then
@@ -145,6 +151,11 @@ contains
       options%study_case = value
     case ('--output')
       options%output = value
+    case ('--write-fields')
+      options%write_fields = value
+      if (index(value//'|', '.h5|') == 0 .and. index(value//'|', '.csv|') == 0) then
+        call fail(option//' needs '//what_it_needs(option)//instead_of(value), error)
+      end if
     case ('--walltime')
       call read_duration(value, options%walltime, error)
     case default ! --realization
@@ -164,6 +175,8 @@ contains
       text = 'the label of a case'
     case ('--output')
       text = 'a directory'
+    case ('--write-fields')
+      text = 'the name of a file, .h5 or .csv'
     case ('--walltime')
       text = 'HH:MM:SS above zero'
     case default ! --realization
@@ -261,6 +274,9 @@ contains
       '  --realization I         compute one member again, by itself, and print its row'//N// &
       '    --study-case LABEL    of this case of a study, as snx_cov0.05 or deterministic'//N// &
       '    --snapshots           and write its states to DIR/snapshots'//N// &
+      '  --write-fields FILE     write the random fields and run nothing: all realizations into'// &
+      ' FILE.h5,'//N// &
+      '                          or one (--realization, --study-case) into FILE.csv'//N// &
       '  --version, --help'//N//N// &
       'Exit codes: 0 complete; 1 internal error; 2 bad input; 3 stopped early, resumable;'//N// &
       '4 complete, but more failed members than allowed.'//N// &

@@ -8,9 +8,10 @@ module sg_config
 
   public :: config_t, grid_config_t, material_config_t, body_config_t, boundary_config_t
   public :: loading_config_t
-  public :: solver_config_t, random_field_config_t, monte_carlo_config_t, study_config_t
+  public :: solver_config_t, random_field_config_t, cross_correlation_config_t
+  public :: monte_carlo_config_t, study_config_t
   public :: output_config_t
-  public :: NAME_LENGTH, EDGE_TOLERANCE
+  public :: NAME_LENGTH, EDGE_TOLERANCE, nominal_value
 
   !> Length of names and of words out of a fixed choice.
   integer, parameter :: NAME_LENGTH = 64
@@ -88,17 +89,33 @@ module sg_config
   end type solver_config_t
 
   type :: random_field_config_t
-    character(len=NAME_LENGTH) :: property, material, distribution, acf, method
-    !> Index into `config_t%materials`.
-    integer :: material_index
-    real(wp) :: mean, cov, scale_x, scale_y, lower, upper
+    character(len=NAME_LENGTH) :: name, property, material, body, distribution, acf, form, averaging
+    character(len=NAME_LENGTH) :: method
+    !> Index into `config_t%materials` and `config_t%bodies`; 0 for all bodies.
+    integer :: material_index, body_index
+    !> Corners x1, y1, x2, y2, ...; size 0 for everywhere.
+    real(wp), allocatable :: region(:)
+    real(wp) :: mean, mean_gradient, sd_gradient, smoothness, scale_x, scale_y, rotation
+    !> What may be left out: size 0 or 1.
+    real(wp), allocatable :: cov(:), sd(:), datum(:), lower(:), upper(:)
+    !> lower and upper, or what the property has instead of them: +-huge for no bound.
+    real(wp) :: bounds(2)
+    !> Files of measurements and of fields, and what they hold (a hash); empty for none.
+    character(len=:), allocatable :: data, file, data_content, file_content
   end type random_field_config_t
+
+  type :: cross_correlation_config_t
+    !> Names of fields, and their indices into `config_t%random_fields`.
+    character(len=NAME_LENGTH), allocatable :: between(:)
+    integer :: fields(2)
+    real(wp) :: coefficient
+  end type cross_correlation_config_t
 
   type :: monte_carlo_config_t
     !> Total number of realizations of each case.
     integer :: realizations
     integer(i8) :: seed
-    character(len=NAME_LENGTH) :: stop_rule
+    character(len=NAME_LENGTH) :: stop_rule, sampling
     !> Members of the homogeneous case: 1 nominal and the rest with meaningless perturbations.
     integer :: noise_members
     !> Share of failed members up to which the run still counts as good (exit code 0).
@@ -108,8 +125,8 @@ module sg_config
   end type monte_carlo_config_t
 
   type :: study_config_t
-    !> Every combination is a case. Size 1 with the value of &random_field where &study does not
-    !> list the key.
+    !> Every combination is a case, by the first field. Size 1 with the value of &random_field where
+    !> &study does not list the key; cov is 0 where that field has sd instead.
     character(len=NAME_LENGTH), allocatable :: acf(:)
     real(wp), allocatable :: cov(:)
   end type study_config_t
@@ -133,14 +150,37 @@ module sg_config
     type(boundary_config_t), allocatable :: boundaries(:)
     type(loading_config_t) :: loading
     type(solver_config_t) :: solver
-    !> False: no &random_field group, the run is deterministic and `random_field` holds nothing of
-    !> meaning.
+    !> False: no &random_field group, the run is deterministic.
     logical :: has_random_field = .false.
-    type(random_field_config_t) :: random_field
+    type(random_field_config_t), allocatable :: random_fields(:)
+    type(cross_correlation_config_t), allocatable :: cross_correlations(:)
     type(monte_carlo_config_t) :: monte_carlo
     !> False: no &study group, the heterogeneous case is called `base`.
     logical :: has_study = .false.
     type(study_config_t) :: study
     type(output_config_t) :: output
   end type config_t
+contains
+
+  !> What a material says of a property that random fields can vary; of the friction angle for its
+  !> tangent.
+  pure real(wp) function nominal_value(material, property) result(value)
+    type(material_config_t), intent(in) :: material
+    character(len=*), intent(in) :: property
+
+    select case (property)
+    case ('cohesion')
+      value = material%cohesion
+    case ('undrained_strength')
+      value = material%undrained_strength
+    case ('young')
+      value = material%young
+    case ('density')
+      value = material%density
+    case ('dilation_angle')
+      value = material%dilation_angle
+    case default
+      value = material%friction_angle
+    end select
+  end function nominal_value
 end module sg_config

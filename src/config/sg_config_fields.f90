@@ -140,7 +140,14 @@ contains
     call visitor%visit('body_force', config%loading%body_force)
     call visitor%visit('amplitude', config%loading%amplitude)
     call visit_solver(config, visitor)
-    if (config%has_random_field) call visit_random_field(config, visitor)
+    do i = 1, size(config%random_fields)
+      call visit_random_field(config, i, visitor)
+    end do
+    do i = 1, size(config%cross_correlations)
+      call visitor%begin_group('cross_correlation', i)
+      call visitor%visit_list('between', config%cross_correlations(i)%between)
+      call visitor%visit('coefficient', config%cross_correlations(i)%coefficient)
+    end do
     call visit_monte_carlo(config, visitor)
     if (config%has_study) then
       call visitor%begin_group('study', 1)
@@ -255,22 +262,40 @@ contains
     call visitor%visit_list('needless', config%solver%needless)
   end subroutine visit_solver
 
-  subroutine visit_random_field(config, visitor)
+  subroutine visit_random_field(config, i, visitor)
     type(config_t), intent(inout) :: config
+    integer, intent(in) :: i
     class(config_visitor_t), intent(inout) :: visitor
 
-    call visitor%begin_group('random_field', 1)
-    call visitor%visit('property', config%random_field%property)
-    call visitor%visit('material', config%random_field%material)
-    call visitor%visit('distribution', config%random_field%distribution)
-    call visitor%visit('mean', config%random_field%mean)
-    call visitor%visit('cov', config%random_field%cov)
-    call visitor%visit('acf', config%random_field%acf)
-    call visitor%visit('scale_x', config%random_field%scale_x)
-    call visitor%visit('scale_y', config%random_field%scale_y)
-    call visitor%visit('lower', config%random_field%lower)
-    call visitor%visit('upper', config%random_field%upper)
-    call visitor%visit('method', config%random_field%method)
+    associate (field => config%random_fields(i))
+      call visitor%begin_group('random_field', i)
+      call visitor%visit('name', field%name)
+      call visitor%visit('property', field%property)
+      call visitor%visit('material', field%material)
+      call visitor%visit('body', field%body)
+      call visitor%visit_list('region', field%region)
+      call visitor%visit('distribution', field%distribution)
+      call visitor%visit('mean', field%mean)
+      call visitor%visit_list('cov', field%cov)
+      call visitor%visit_list('sd', field%sd)
+      call visitor%visit('mean_gradient', field%mean_gradient)
+      call visitor%visit('sd_gradient', field%sd_gradient)
+      call visitor%visit_list('datum', field%datum)
+      call visitor%visit('acf', field%acf)
+      call visitor%visit('smoothness', field%smoothness)
+      call visitor%visit('form', field%form)
+      call visitor%visit('scale_x', field%scale_x)
+      call visitor%visit('scale_y', field%scale_y)
+      call visitor%visit('rotation', field%rotation)
+      call visitor%visit('averaging', field%averaging)
+      call visitor%visit_list('lower', field%lower)
+      call visitor%visit_list('upper', field%upper)
+      call visitor%visit('method', field%method)
+      call visitor%visit_text('data', field%data)
+      call visitor%visit_text('data_content', field%data_content)
+      call visitor%visit_text('file', field%file)
+      call visitor%visit_text('file_content', field%file_content)
+    end associate
   end subroutine visit_random_field
 
   subroutine visit_monte_carlo(config, visitor)
@@ -280,6 +305,7 @@ contains
     call visitor%begin_group('monte_carlo', 1)
     call visitor%visit('realizations', config%monte_carlo%realizations)
     call visitor%visit('seed', config%monte_carlo%seed)
+    call visitor%visit('sampling', config%monte_carlo%sampling)
     call visitor%visit('stop_rule', config%monte_carlo%stop_rule)
     call visitor%visit('noise_members', config%monte_carlo%noise_members)
     call visitor%visit('max_failed_fraction', config%monte_carlo%max_failed_fraction)

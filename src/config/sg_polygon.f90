@@ -4,7 +4,7 @@ module sg_polygon
   implicit none
   private
 
-  public :: corners_are_distinct, polygon_area, polygon_is_simple
+  public :: corners_are_distinct, polygon_area, polygon_contains, polygon_is_simple
 
   !> Corners, and sides, nearer than this share of the polygon's size count as touching.
   real(wp), parameter :: TOUCH = 1.0e-9_wp
@@ -35,6 +35,26 @@ contains
     real(wp), intent(in) :: corners(:, :)
     extent = maxval(maxval(corners, dim=2) - minval(corners, dim=2))
   end function extent
+
+  !> Is (x, y) in the polygon? By the number of edges crossed to the right (even-odd rule).
+  pure logical function polygon_contains(vertices, x, y) result(inside)
+    !> x1, y1, x2, y2, ...
+    real(wp), intent(in) :: vertices(:)
+    real(wp), intent(in) :: x, y
+    real(wp) :: x1, y1, x2, y2
+    integer :: k, corners
+
+    inside = .false.
+    corners = size(vertices)/2
+    do k = 1, corners
+      x1 = vertices(2*k - 1)
+      y1 = vertices(2*k)
+      x2 = vertices(2*mod(k, corners) + 1)
+      y2 = vertices(2*mod(k, corners) + 2)
+      if ((y1 > y) .eqv. (y2 > y)) cycle
+      if (x < x1 + (y - y1)/(y2 - y1)*(x2 - x1)) inside = .not. inside
+    end do
+  end function polygon_contains
 
   !> Area without sign; 0 if it is no more than rounding.
   pure real(wp) function polygon_area(corners) result(area)

@@ -4,14 +4,14 @@
 module sg_read_config
   use sg_check_config, only: check_config
   use sg_check_keys, only: check_keys
-  use sg_config, only: config_t, NAME_LENGTH
+  use sg_config, only: config_t, NAME_LENGTH, random_field_config_t
   use sg_config_fields, only: config_visitor_t, visit_config
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_fault_list, only: fault_list_t
   use sg_kinds, only: i8, wp
   use sg_namelist, only: namelist_t, nml_value_t
   use sg_number_text, only: parse_integer, parse_real
-  use sg_posix, only: working_directory
+  use sg_posix, only: hash_of_file, working_directory
   use sg_scan, only: scan_namelist
   use sg_schema, only: count_words, key_row, KEYS, KIND_WORD, word_at
   use sg_text, only: lower_case
@@ -20,10 +20,12 @@ module sg_read_config
 
   public :: read_config
 
+  real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
+
   !> Takes values from a scanned case file, or defaults where it has none.
   type, extends(config_visitor_t) :: reader_t
     type(namelist_t) :: nml
-    character(len=16) :: group_name = ''
+    character(len=20) :: group_name = ''
     !> Index of the present group, 0 if the file has not got it.
     integer :: group = 0
     logical :: is_deterministic = .false.
@@ -69,6 +71,9 @@ contains
     allocate (config%materials(reader%nml%count('material')))
     allocate (config%bodies(reader%nml%count('body')))
     allocate (config%boundaries(reader%nml%count('boundary')))
+    allocate (config%random_fields(reader%nml%count('random_field')))
+    allocate (config%cross_correlations(merge(reader%nml%count('cross_correlation'), 0, &
+      config%has_random_field)))
     call visit_config(config, reader)
     call complete(config, file_name)
 
@@ -84,34 +89,99 @@ contains
     integer :: i, mark
 
     do i = 1, size(config%bodies)
-      config%bodies(i)%material_index = index_of_material(config, config%bodies(i)%material)
+      config%bodies(i)%material_index = index_of(config%bodies(i)%material, config%materials%name)
       if (config%bodies(i)%file /= '') config%bodies(i)%file = &
         path_beside(file_name, config%bodies(i)%file)
     end do
     mark = index(config%output%directory, NAME_MARK)
     if (mark > 0) config%output%directory = config%output%directory(:mark - 1)// &
       trim(config%name)//config%output%directory(mark + len(NAME_MARK):)
-    if (.not. config%has_random_field) then
-      config%random_field%material_index = 0
-      return
-    end if
-    config%random_field%material_index = index_of_material(config, config%random_field%material)
-    if (.not. config%has_study) then
-      config%study%acf = [config%random_field%acf]
-      config%study%cov = [config%random_field%cov]
-      return
-    end if
-    if (size(config%study%acf) == 0) then
-      config%study%acf = [config%random_field%acf]
-    else if (len_trim(config%random_field%acf) == 0) then
-      config%random_field%acf = config%study%acf(1)
-    end if
-    if (size(config%study%cov) == 0) then
-      config%study%cov = [config%random_field%cov]
-    else if (.not. config%random_field%cov > 0.0_wp) then
-      config%random_field%cov = config%study%cov(1)
-    end if
+    do i = 1, size(config%random_fields)
+      call complete_field(config, file_name, config%random_fields(i))
+    end do
+    do i = 1, size(config%cross_correlations)
+      config%cross_correlations(i)%fields = 0
+      if (size(config%cross_correlations(i)%between) /= 2) cycle
+      config%cross_correlations(i)%fields = [index_of(config%cross_correlations(i)%between(1), &
+        config%random_fields%name), index_of(config%cross_correlations(i)%between(2), &
+        config%random_fields%name)]
+    end do
+    if (config%has_random_field) call complete_study(config)
   end subroutine complete
+
+  subroutine complete_field(config, file_name, field)
+    type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: file_name
+    type(random_field_config_t), intent(inout) :: field
+
+    if (field%name == '') field%name = field%property
+    field%material_index = index_of(field%material, config%materials%name)
+    field%body_index = index_of(field%body, config%bodies%name)
+    if (field%data /= '') field%data = path_beside(file_name, field%data)
+    if (field%file /= '') field%file = path_beside(file_name, field%file)
+    if (field%data /= '' .and. field%data_content == '') field%data_content = &
+      hash_of_file(field%data)
+    if (field%file /= '' .and. field%file_content == '') field%file_content = &
+      hash_of_file(field%file)
+    if (size(field%lower) == 0) field%lower = [usual_lower(field)]
+    if (size(field%upper) == 0) field%upper = usual_upper(field%property)
+    field%bounds = [field%lower(1), huge(1.0_wp)]
+    if (size(field%upper) > 0) field%bounds(2) = field%upper(1)
+  end subroutine complete_field
+
+  !> Bounds that a property has where the case gives none. Stiffness and density must not vanish.
+  pure real(wp) function usual_lower(field) result(lower)
+    type(random_field_config_t), intent(in) :: field
+
+    select case (field%property)
+    case ('friction_angle')
+      lower = 1.0_wp
+    case ('tan_friction_angle')
+      lower = tan(1.0_wp*DEGREE)
+    case ('young', 'density')
+      lower = 0.01_wp*field%mean
+    case default
+      lower = 0.0_wp
+    end select
+  end function usual_lower
+
+  !> Size 0 for none.
+  pure function usual_upper(property) result(upper)
+    character(len=*), intent(in) :: property
+    real(wp), allocatable :: upper(:)
+
+    select case (property)
+    case ('friction_angle', 'dilation_angle')
+      upper = [60.0_wp]
+    case ('tan_friction_angle')
+      upper = [tan(60.0_wp*DEGREE)]
+    case default
+      allocate (upper(0))
+    end select
+  end function usual_upper
+
+  !> The study varies the first field; without one, or without a list, that is as it is. A list
+  !> takes the place of what the first field has.
+  subroutine complete_study(config)
+    type(config_t), intent(inout) :: config
+
+    if (.not. config%has_study) then
+      allocate (config%study%acf(0), config%study%cov(0))
+    end if
+    associate (field => config%random_fields(1), study => config%study)
+      if (size(study%acf) == 0) then
+        study%acf = [field%acf]
+      else if (len_trim(field%acf) == 0) then
+        field%acf = study%acf(1)
+      end if
+      if (size(study%cov) == 0) then
+        study%cov = [0.0_wp]
+        if (size(field%cov) > 0) study%cov = field%cov
+      else if (size(field%cov) == 0 .and. size(field%sd) == 0) then
+        field%cov = [study%cov(1)]
+      end if
+    end associate
+  end subroutine complete_study
 
   !> `path` as it counts from the directory of `file_name`, made absolute so that resolved.nml can
   !> stand elsewhere.
@@ -124,14 +194,15 @@ contains
     if (absolute(1:1) /= '/') absolute = working_directory()//'/'//absolute
   end function path_beside
 
-  pure integer function index_of_material(config, name) result(i)
-    type(config_t), intent(in) :: config
-    character(len=*), intent(in) :: name
+  !> The first of `names` that is `name`, or 0.
+  pure integer function index_of(name, names) result(i)
+    character(len=*), intent(in) :: name, names(:)
 
-    do i = size(config%materials), 1, -1
-      if (config%materials(i)%name == name) return
+    do i = 1, size(names)
+      if (names(i) == name) return
     end do
-  end function index_of_material
+    i = 0
+  end function index_of
 
   subroutine begin_group(this, group, occurrence)
     class(reader_t), intent(inout) :: this

@@ -19,7 +19,7 @@ module sg_resolved
   !> Collects the values of a configuration as the text of a case file.
   type, extends(config_visitor_t) :: writer_t
     type(namelist_t) :: nml
-    character(len=16) :: group_name = ''
+    character(len=20) :: group_name = ''
   contains
     procedure :: take
     procedure :: take_one
@@ -115,6 +115,13 @@ contains
       other = old%locate(new%groups(g)%name, occurrence(new, g))
       call compare_groups(new, g, old, other, .true., differences)
     end do
+    ! What a member of a Latin hypercube is depends on how many there are.
+    associate (then => old_config%monte_carlo, now => new_config%monte_carlo)
+      if (then%sampling /= 'latin_hypercube' .or. then%realizations == now%realizations) return
+      if (len(differences) > 0) differences = differences//new_line('a')
+      differences = differences//'&monte_carlo realizations: '//to_text(then%realizations)// &
+        ' -> '//to_text(now%realizations)//' (a Latin hypercube has a fixed size)'
+    end associate
   end subroutine compare_configs
 
   !> Compares group `g` of `here` with group `o` of `there` (0: not there). `backwards`: `here` is
@@ -242,9 +249,8 @@ contains
     integer :: row
 
     row = key_row(this%group_name, key)
-    ! A key without default that is not required and out of its range has not been given.
-    if (.not. KEYS(row)%required .and. len_trim(KEYS(row)%default) == 0 .and. &
-      .not. range_holds(KEYS(row)%range, value)) return
+    ! A key without default that is out of its range has not been given.
+    if (len_trim(KEYS(row)%default) == 0 .and. .not. range_holds(KEYS(row)%range, value)) return
     call this%take_one(key, to_text(value))
   end subroutine visit_real
 
@@ -306,6 +312,8 @@ contains
     character(len=*), intent(in) :: key
     character(len=NAME_LENGTH), intent(inout) :: value
 
+    ! A name that has not been given, and needs not.
+    if (value == '') return
     call this%take_one(key, value)
   end subroutine visit_word
 

@@ -26,7 +26,7 @@ module sg_schema
   integer, parameter :: ANY_NUMBER = 0
 
   type :: group_t
-    character(len=16) :: name
+    character(len=20) :: name
     character(len=128) :: meaning
     logical :: required = .false.
     logical :: repeatable = .false.
@@ -37,7 +37,7 @@ module sg_schema
   end type group_t
 
   type :: key_t
-    character(len=16) :: group
+    character(len=20) :: group
     character(len=24) :: name
     integer :: kind
     character(len=8) :: unit = ''
@@ -78,8 +78,10 @@ module sg_schema
     repeatable=.true., in_example=.false.), &
     group_t('loading', 'Gravity, damping and the stress at the start'), &
     group_t('solver', 'Discretisation in space and time', required=.true.), &
-    group_t('random_field', 'Random field of a material property; without this group the run '// &
-    'is deterministic'), &
+    group_t('random_field', 'Random field of a material property, one group for each; without '// &
+    'this group the run is deterministic', repeatable=.true.), &
+    group_t('cross_correlation', 'Correlation between two random fields; one group for each', &
+    repeatable=.true., needs='random_field', in_example=.false.), &
     group_t('monte_carlo', 'How many realizations, and when a run counts as good'), &
     group_t('study', 'Every combination of the listed values is a case, with the same random '// &
     'numbers in all', needs='random_field'), &
@@ -265,34 +267,82 @@ module sg_schema
     meaning='Work that is done although the scene can do without it: for tests of what is '// &
     'skipped, and of what that saves (docs/skips.md)')]
 
+  character(len=*), parameter :: STUDY_ACFS = 'snx sqx smk csx bin matern32 matern52 spherical'
+  character(len=*), parameter :: ACFS = STUDY_ACFS//' matern'
+
   type(key_t), parameter :: RANDOM_FIELD_KEYS(*) = [ &
+    key_t('random_field', 'name', KIND_NAME, meaning='Name in messages and results, where '// &
+    'several fields have the same property; without it the property'), &
     key_t('random_field', 'property', KIND_WORD, default='friction_angle', &
-    choices='friction_angle', later='density young poisson dilation_angle cohesion '// &
-    'tension_strength undrained_strength', meaning='Property that varies'), &
+    choices='friction_angle tan_friction_angle cohesion undrained_strength young density '// &
+    'dilation_angle', meaning='Property that varies; tan_friction_angle: the tangent of the '// &
+    'friction angle has the distribution'), &
     key_t('random_field', 'material', KIND_NAME, example='sand', required=.true., &
     meaning='Name of the material whose property varies'), &
+    key_t('random_field', 'body', KIND_NAME, &
+    meaning='Name of a body: the field is for its points alone'), &
+    key_t('random_field', 'region', KIND_REAL, unit='m', size=ANY_NUMBER, &
+    meaning='Corners x1, y1, x2, y2, ... of a polygon: the field is for the points in it. '// &
+    'Of several fields of a property at a point the last one counts'), &
     key_t('random_field', 'distribution', KIND_WORD, default='normal', &
-    choices='normal lognormal', later='beta gamma gumbel uniform weibull', &
-    meaning='Marginal distribution'), &
-    key_t('random_field', 'mean', KIND_REAL, unit='*', example='35', range='(0,)', &
-    required=.true., meaning='Mean before truncation, in the unit of the property'), &
+    choices='normal lognormal truncated_normal beta gamma gumbel weibull uniform', &
+    meaning='Marginal distribution; truncated_normal and beta end at lower and upper'), &
+    key_t('random_field', 'mean', KIND_REAL, unit='*', example='35', &
+    required=.true., meaning='Mean before values are set to the bounds (truncated_normal: '// &
+    'before it is cut), in the unit of the property'), &
     key_t('random_field', 'cov', KIND_REAL, unit='1', example='0.05', range='(0,2]', &
-    required=.true., supplied_by='study', &
-    meaning='Coefficient of variation before truncation; cov of &study replaces it'), &
+    meaning='Coefficient of variation, as the mean; or sd. cov of &study replaces that of the '// &
+    'first field'), &
+    key_t('random_field', 'sd', KIND_REAL, unit='*', range='(0,)', &
+    meaning='Standard deviation instead of cov'), &
+    key_t('random_field', 'mean_gradient', KIND_REAL, unit='*/m', default='0', &
+    meaning='Growth of the mean with each metre below the datum'), &
+    key_t('random_field', 'sd_gradient', KIND_REAL, unit='*/m', default='0', &
+    meaning='Growth of sd with each metre below the datum; with cov, sd follows the mean'), &
+    key_t('random_field', 'datum', KIND_REAL, unit='m', &
+    meaning='Height y at which mean and sd hold; without it the highest point of the field'), &
     key_t('random_field', 'acf', KIND_WORD, example='snx', required=.true., &
-    choices='snx sqx smk csx bin', supplied_by='study', &
-    meaning='Autocorrelation function of Table 1 of the paper; acf of &study replaces it'), &
+    choices=ACFS, supplied_by='study', meaning='Autocorrelation function: the five of Table 1 '// &
+    'of the paper, Matern, spherical. acf of &study replaces that of the first field, and is '// &
+    'that of others without one'), &
+    key_t('random_field', 'smoothness', KIND_REAL, unit='1', example='1.5', range='(0,50]', &
+    required=.true., when='acf', when_is='matern', meaning='nu of the Matern function'), &
+    key_t('random_field', 'form', KIND_WORD, default='product', choices='product radial', &
+    meaning='rho(x/scale_x) rho(y/scale_y), or rho of the distance in scales of fluctuation'), &
     key_t('random_field', 'scale_x', KIND_REAL, unit='m', example='0.2', range='(0,)', &
-    required=.true., meaning='Scale of fluctuation along x'), &
+    required=.true., meaning='Scale of fluctuation along x, or along the bedding'), &
     key_t('random_field', 'scale_y', KIND_REAL, unit='m', example='0.2', range='(0,)', &
-    required=.true., meaning='Scale of fluctuation along y'), &
-    key_t('random_field', 'lower', KIND_REAL, unit='*', default='1', range='[0,)', &
-    meaning='Values below are set to it; the share of such points is reported'), &
-    key_t('random_field', 'upper', KIND_REAL, unit='*', default='60', range='(0,)', &
-    meaning='Values above are set to it'), &
+    required=.true., meaning='Scale of fluctuation along y, or across the bedding'), &
+    key_t('random_field', 'rotation', KIND_REAL, unit='deg', default='0', range='[-180,180]', &
+    meaning='Angle of the bedding from x, counter-clockwise'), &
+    key_t('random_field', 'averaging', KIND_WORD, default='none', choices='none cell', &
+    meaning='none: values of points; cell: averages over the cell of each point, which vary '// &
+    'less'), &
+    key_t('random_field', 'lower', KIND_REAL, unit='*', meaning='Values below are set to it, '// &
+    'the share of such points is reported. Without it: friction 1 deg, young and density 1 % '// &
+    'of the mean, others 0'), &
+    key_t('random_field', 'upper', KIND_REAL, unit='*', meaning='Values above are set to it. '// &
+    'Without it: angles 60 deg, others unlimited'), &
     key_t('random_field', 'method', KIND_WORD, default='auto', &
     choices='auto kronecker cholesky circulant', &
-    meaning='How fields are sampled; auto takes the cheapest exact one for the points')]
+    meaning='How fields are sampled; auto takes the cheapest exact one for the points'), &
+    key_t('random_field', 'data', KIND_TEXT, identity=.false., &
+    meaning='CSV file of measurements, first line '// &
+    'x,y,value,error: fields agree with them up to the error (its standard deviation). Its '// &
+    'path counts from the case file'), &
+    key_t('random_field', 'data_content', KIND_TEXT, meaning='Hash of that file, written by '// &
+    'the program: with it, a file that has changed is refused'), &
+    key_t('random_field', 'file', KIND_TEXT, identity=.false., &
+    meaning='File of fields made elsewhere or by '// &
+    '--write-fields, HDF5 or CSV: taken instead of sampling. Its path counts from the case file'), &
+    key_t('random_field', 'file_content', KIND_TEXT, meaning='Hash of that file, as data_content')]
+
+  type(key_t), parameter :: CROSS_CORRELATION_KEYS(*) = [ &
+    key_t('cross_correlation', 'between', KIND_NAME, size=2, example='friction_angle cohesion', &
+    required=.true., meaning='Names of two random fields'), &
+    key_t('cross_correlation', 'coefficient', KIND_REAL, unit='1', range='(-1,1)', &
+    example='-0.5', required=.true., &
+    meaning='Correlation of the two underlying Gaussian fields at the same point')]
 
   type(key_t), parameter :: MONTE_CARLO_KEYS(*) = [ &
     key_t('monte_carlo', 'realizations', KIND_INTEGER, example='100', range='[1,1000000000]', &
@@ -300,6 +350,10 @@ module sg_schema
     meaning='Realizations of each case, in total: a resumed run may ask for more'), &
     key_t('monte_carlo', 'seed', KIND_INTEGER, default='2022', range='[0,)', &
     meaning='First word of the key of the random numbers (Philox4x64-10)'), &
+    key_t('monte_carlo', 'sampling', KIND_WORD, default='random', &
+    choices='random antithetic latin_hypercube', needs='random_field', &
+    meaning='random: members are independent; antithetic: every second one mirrors the one '// &
+    'before; latin_hypercube: stratified over all realizations'), &
     key_t('monte_carlo', 'stop_rule', KIND_WORD, default='count', choices='count', &
     later='precision successive', needs='random_field', identity=.false., &
     meaning='When to end a case: after all realizations, or earlier'), &
@@ -315,9 +369,9 @@ module sg_schema
 
   type(key_t), parameter :: STUDY_KEYS(*) = [ &
     key_t('study', 'acf', KIND_WORD, example='snx sqx', size=ANY_NUMBER, &
-    choices='snx sqx smk csx bin', meaning='Autocorrelation functions'), &
+    choices=STUDY_ACFS, meaning='Autocorrelation functions of the first field'), &
     key_t('study', 'cov', KIND_REAL, unit='1', example='0.05 0.10', range='(0,2]', &
-    size=ANY_NUMBER, meaning='Coefficients of variation')]
+    size=ANY_NUMBER, meaning='Coefficients of variation of the first field')]
 
   type(key_t), parameter :: OUTPUT_KEYS(*) = [ &
     key_t('output', 'directory', KIND_TEXT, default='runs/<name>', identity=.false., &
@@ -334,8 +388,8 @@ module sg_schema
     identity=.false., meaning='Wall clock time between two progress lines')]
 
   type(key_t), parameter :: KEYS(*) = [CASE_KEYS, GRID_KEYS, MATERIAL_KEYS, BODY_KEYS, &
-    BOUNDARY_KEYS, LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, MONTE_CARLO_KEYS, STUDY_KEYS, &
-    OUTPUT_KEYS]
+    BOUNDARY_KEYS, LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, CROSS_CORRELATION_KEYS, &
+    MONTE_CARLO_KEYS, STUDY_KEYS, OUTPUT_KEYS]
 
 contains
 

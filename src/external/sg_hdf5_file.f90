@@ -1,14 +1,17 @@
-!> The only user of HDF5: files with groups, attributes and plain datasets, written whole. Paths in
-!> a file are like /cases/base/id. A Fortran array a(m, n) appears in C and Python as [n, m].
+!> The only user of HDF5: files with groups, attributes and plain datasets, written whole or read.
+!> Paths in a file are like /cases/base/id. A Fortran array a(m, n) appears in C and Python as [n,
+!> m].
 module sg_hdf5_file
   use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_ptr
-  use hdf5, only: h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dcreate_f, &
-    h5dwrite_f, h5eset_auto_f, h5fclose_f, h5fcreate_f, h5gclose_f, h5gcreate_f, &
-    h5kind_to_type, h5oclose_f, h5oopen_f, h5open_f, h5sclose_f, h5screate_f, &
-    h5screate_simple_f, h5tclose_f, h5tcopy_f, h5tset_size_f, h5tset_strpad_f, &
-    H5F_ACC_TRUNC_F, H5S_SCALAR_F, H5T_NATIVE_CHARACTER, H5T_STR_NULLPAD_F, &
+  use hdf5, only: h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dcreate_f, h5dget_space_f, &
+    h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, h5fclose_f, h5fcreate_f, h5fopen_f, &
+    h5gclose_f, h5gcreate_f, h5gget_obj_info_idx_f, h5gn_members_f, h5kind_to_type, &
+    h5oclose_f, h5oopen_f, h5open_f, h5sclose_f, h5screate_f, h5screate_simple_f, &
+    h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
+    h5tclose_f, h5tcopy_f, h5tset_size_f, h5tset_strpad_f, H5F_ACC_RDONLY_F, &
+    H5F_ACC_TRUNC_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_NATIVE_CHARACTER, H5T_STR_NULLPAD_F, &
     H5_INTEGER_KIND, H5_REAL_KIND, hid_t, hsize_t, size_t
-  use sg_errors, only: error_t, EXIT_INTERNAL, raise
+  use sg_errors, only: error_t, EXIT_BAD_INPUT, EXIT_INTERNAL, raise
   use sg_kinds, only: i4, i8, sp, wp
   implicit none
   private
@@ -25,7 +28,11 @@ module sg_hdf5_file
     character(len=:), allocatable :: path, failure
   contains
     procedure :: create
+    procedure :: open_old
     procedure :: close
+    procedure :: only_member
+    procedure :: extents_of
+    procedure :: read_part
     procedure :: make_group
     procedure, private :: write_real_1, write_real_2, write_single_1, write_single_2
     procedure, private :: write_integer_1, write_long_1, write_texts
@@ -47,15 +54,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: status
 
-    this%failed = .false.
-    this%path = path
-    call h5open_f(status)
-    call look(this, status, 'the library')
-    if (.not. this%failed) then
-      ! The library prints its errors unless told otherwise.
-      call h5eset_auto_f(0, status)
-      call look(this, status, 'the library')
-    end if
+    call start(this, path)
     if (.not. this%failed) then
       call h5fcreate_f(path, H5F_ACC_TRUNC_F, this%id, status)
       call look(this, status, 'the file')
@@ -63,6 +62,104 @@ contains
     this%is_open = .not. this%failed
     if (this%failed) call raise(error, EXIT_INTERNAL, this%failure, 'hdf5_file_t%create')
   end subroutine create
+
+  !> Starts the library, which prints its errors unless told otherwise.
+  subroutine start(this, path)
+    class(hdf5_file_t), intent(inout) :: this
+    character(len=*), intent(in) :: path
+    integer :: status
+
+    this%failed = .false.
+    this%path = path
+    call h5open_f(status)
+    call look(this, status, 'the library')
+    if (this%failed) return
+    call h5eset_auto_f(0, status)
+    call look(this, status, 'the library')
+  end subroutine start
+
+  !> An old file, to be read.
+  subroutine open_old(this, path, error)
+    class(hdf5_file_t), intent(inout) :: this
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(out) :: error
+    integer :: status
+
+    call start(this, path)
+    status = -1
+    if (.not. this%failed) call h5fopen_f(path, H5F_ACC_RDONLY_F, this%id, status)
+    this%is_open = status >= 0
+    if (.not. this%is_open) call raise(error, EXIT_BAD_INPUT, path//' cannot be read, or is no '// &
+      'HDF5 file', 'hdf5_file_t%open_old')
+  end subroutine open_old
+
+  !> Name of the one member of a group; empty if there are more or none.
+  function only_member(this, group) result(name)
+    class(hdf5_file_t), intent(in) :: this
+    character(len=*), intent(in) :: group
+    character(len=:), allocatable :: name
+    character(len=256) :: buffer
+    integer :: members, kind, status
+
+    name = ''
+    call h5gn_members_f(this%id, group, members, status)
+    if (status < 0 .or. members /= 1) return
+    call h5gget_obj_info_idx_f(this%id, group, 0, buffer, kind, status)
+    if (status >= 0) name = trim(buffer)
+  end function only_member
+
+  !> Extents of a dataset as in Fortran; size 0 if there is no such dataset.
+  function extents_of(this, name) result(extents)
+    class(hdf5_file_t), intent(in) :: this
+    character(len=*), intent(in) :: name
+    integer(i8), allocatable :: extents(:)
+    integer(hid_t) :: dataset, space
+    integer(hsize_t), allocatable :: now(:), most(:)
+    integer :: rank, status, ignored
+
+    allocate (extents(0))
+    call h5dopen_f(this%id, name, dataset, status)
+    if (status < 0) return
+    call h5dget_space_f(dataset, space, status)
+    if (status >= 0) then
+      call h5sget_simple_extent_ndims_f(space, rank, status)
+      allocate (now(rank), most(rank))
+      call h5sget_simple_extent_dims_f(space, now, most, status)
+      if (status >= 0) extents = int(now, i8)
+      call h5sclose_f(space, ignored)
+    end if
+    call h5dclose_f(dataset, ignored)
+  end function extents_of
+
+  !> The numbers of a dataset a(n), or the column a(:, column) of a(n, m).
+  subroutine read_part(this, name, column, values, error)
+    class(hdf5_file_t), intent(in) :: this
+    character(len=*), intent(in) :: name
+    !> 0: all of a(n).
+    integer(i8), intent(in) :: column
+    !> [n].
+    real(wp), intent(out), target, contiguous :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer(hid_t) :: dataset, space, memory
+    type(c_ptr) :: address
+    integer :: status, ignored
+
+    call h5dopen_f(this%id, name, dataset, status)
+    if (status >= 0) then
+      call h5dget_space_f(dataset, space, status)
+      call h5screate_simple_f(1, [size(values, kind=hsize_t)], memory, ignored)
+      if (status >= 0 .and. column > 0) call h5sselect_hyperslab_f(space, H5S_SELECT_SET_F, &
+        [0_hsize_t, int(column - 1, hsize_t)], [size(values, kind=hsize_t), 1_hsize_t], status)
+      address = c_loc(values)
+      if (status >= 0) call h5dread_f(dataset, h5kind_to_type(wp, H5_REAL_KIND), address, status, &
+        memory, space)
+      call h5sclose_f(memory, ignored)
+      call h5sclose_f(space, ignored)
+      call h5dclose_f(dataset, ignored)
+    end if
+    if (status < 0) call raise(error, EXIT_BAD_INPUT, name//' of '//this%path//' cannot be read', &
+      'hdf5_file_t%read_part')
+  end subroutine read_part
 
   !> Closes the file; `error` tells the first thing that failed since `create`.
   subroutine close (this, error)

@@ -8,7 +8,8 @@ module sg_linear_algebra
   implicit none
   private
 
-  public :: factor_cholesky, multiply_from_left, multiply_from_right_transposed, multiply_vector
+  public :: factor_cholesky, factor_semidefinite, multiply_from_left
+  public :: multiply_from_right_transposed, multiply_vector, solve_lower, solve_factored
   public :: use_one_blas_thread, count_blas_threads
 
   interface
@@ -20,6 +21,37 @@ module sg_linear_algebra
       real(wp), intent(inout) :: a(lda, *)
       integer, intent(out) :: info
     end subroutine dpotrf
+
+    subroutine dpstrf(uplo, n, a, lda, piv, rank, tol, work, info)
+      import :: wp
+      implicit none
+      character, intent(in) :: uplo
+      integer, intent(in) :: n, lda
+      real(wp), intent(inout) :: a(lda, *)
+      integer, intent(out) :: piv(*), rank
+      real(wp), intent(in) :: tol
+      real(wp), intent(inout) :: work(*)
+      integer, intent(out) :: info
+    end subroutine dpstrf
+
+    subroutine dpotrs(uplo, n, nrhs, a, lda, b, ldb, info)
+      import :: wp
+      implicit none
+      character, intent(in) :: uplo
+      integer, intent(in) :: n, nrhs, lda, ldb
+      real(wp), intent(in) :: a(lda, *)
+      real(wp), intent(inout) :: b(ldb, *)
+      integer, intent(out) :: info
+    end subroutine dpotrs
+
+    subroutine dtrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+      import :: wp
+      implicit none
+      character, intent(in) :: side, uplo, transa, diag
+      integer, intent(in) :: m, n, lda, ldb
+      real(wp), intent(in) :: alpha, a(lda, *)
+      real(wp), intent(inout) :: b(ldb, *)
+    end subroutine dtrsm
 
     subroutine dtrmm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
       import :: wp
@@ -74,6 +106,48 @@ contains
     failed_row = abs(failed_row)
     if (ieee_support_underflow_control(1.0_wp)) call ieee_set_underflow_mode(gradual)
   end subroutine factor_cholesky
+
+  !> A = F F^T with F [n, rank] by complete pivoting, for a symmetric A that is positive
+  !> semidefinite to `tolerance`: pivots below it end the factorization and count as zero.
+  subroutine factor_semidefinite(a, tolerance, factor)
+    !> [n, n]; destroyed.
+    real(wp), contiguous, intent(inout) :: a(:, :)
+    real(wp), intent(in) :: tolerance
+    real(wp), allocatable, intent(out) :: factor(:, :)
+    real(wp) :: work(2*size(a, 1))
+    integer :: pivot(size(a, 1)), i, rank, info
+
+    rank = 0
+    ! dpstrf takes the first pivot unseen.
+    if (size(a, 1) > 0) then
+      if (maxval([(a(i, i), i=1, size(a, 1))]) > tolerance) call dpstrf('L', size(a, 1), a, &
+        size(a, 1), pivot, rank, tolerance, work, info)
+    end if
+    allocate (factor(size(a, 1), rank))
+    if (rank == 0) return
+    factor = 0.0_wp
+    do i = 1, size(a, 1)
+      factor(pivot(i), :min(i, rank)) = a(i, :min(i, rank))
+    end do
+  end subroutine factor_semidefinite
+
+  !> B <- L^-1 B with L [m, m] lower triangular, B [m, n].
+  subroutine solve_lower(l, b)
+    real(wp), contiguous, intent(in) :: l(:, :)
+    real(wp), contiguous, intent(inout) :: b(:, :)
+
+    call dtrsm('L', 'L', 'N', 'N', size(b, 1), size(b, 2), 1.0_wp, l, size(l, 1), b, size(b, 1))
+  end subroutine solve_lower
+
+  !> x <- (L L^T)^-1 x with L [n, n] lower triangular.
+  subroutine solve_factored(l, x)
+    real(wp), contiguous, intent(in) :: l(:, :)
+    real(wp), contiguous, intent(inout) :: x(:)
+    integer :: info
+
+    ! A negative info names a bad argument; there is no way to pass one from here.
+    call dpotrs('L', size(x), 1, l, max(size(l, 1), 1), x, max(size(x), 1), info)
+  end subroutine solve_factored
 
   !> B <- L B with L [m, m] lower triangular, B [m, n].
   subroutine multiply_from_left(l, b)

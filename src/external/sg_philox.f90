@@ -11,11 +11,15 @@ module sg_philox
   private
 
   public :: fill_uniform, fill_words, philox_block
-  public :: FIELD_STREAM, NOISE_STREAM
+  public :: DATA_STREAM, FIELD_STREAM, field_stream_of, NOISE_STREAM
 
-  !> Streams: the random field, and the perturbations of the homogeneous members.
+  !> Streams: the first random field, the perturbations of the homogeneous members, the errors of
+  !> measurements.
   integer, parameter :: FIELD_STREAM = 1
   integer, parameter :: NOISE_STREAM = 2
+  integer, parameter :: DATA_STREAM = 3
+  !> The other random fields come after it.
+  integer, parameter :: MORE_FIELDS = 100
 
   integer, parameter :: WORDS_PER_BLOCK = 4
   !> Words turned into numbers at a time, while they are in the cache.
@@ -33,6 +37,14 @@ module sg_philox
   end interface
 
 contains
+
+  !> The stream of the k-th random field.
+  pure integer function field_stream_of(k) result(stream)
+    integer, intent(in) :: k
+
+    stream = FIELD_STREAM
+    if (k > 1) stream = MORE_FIELDS + k
+  end function field_stream_of
 
   !> Uniform numbers in the open interval (0, 1), one of each 64-bit word r:
   !> (floor(r/2^12) + 1/2) 2^-52. Every value is exact in double precision, and u and 1 - u are

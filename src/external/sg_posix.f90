@@ -13,7 +13,7 @@ module sg_posix
   public :: end_program
   public :: file_exists, read_file, read_text, replace_file, write_file, make_directory
   public :: remove_file, remove_files
-  public :: host_name, utc_time, working_directory, sleep_seconds, checksum, hash_text
+  public :: host_name, utc_time, working_directory, sleep_seconds, checksum, hash_text, hash_of_file
 
   !> A file to which bytes are added: after `append` they outlive this process, after `sync` they
   !> are on disk.
@@ -416,6 +416,18 @@ contains
     bytes = transfer(text, bytes, len(text))
     write (digits, '(z16.16)') sg_fnv1a(bytes, size(bytes, kind=i8))
   end function hash_text
+
+  !> Hash of what a file holds; empty if it cannot be read.
+  function hash_of_file(path) result(digits)
+    character(len=*), intent(in) :: path
+    character(len=:), allocatable :: digits
+    character(len=:), allocatable :: text
+    type(error_t), allocatable :: error
+
+    digits = ''
+    call read_text(path, text, error)
+    if (.not. allocated(error)) digits = hash_text(text)
+  end function hash_of_file
 
   !> Sets `error` when `status` is negative: minus the error number of the system.
   subroutine check(status, message, place, code, error)

@@ -19,13 +19,15 @@ contains
 
   !> C + jitter I = L L^T with the smallest jitter of the ladder for which LAPACK factors it.
   subroutine factor_correlation(matrix, jitter, error)
-    !> [n, n]: C in, with unit diagonal; L out, its strict upper triangle still that of C.
+    !> [n, n]: C in, with a diagonal of order 1; L out, its strict upper triangle still that of C.
     real(wp), contiguous, intent(inout) :: matrix(:, :)
     real(wp), intent(out) :: jitter
     type(error_t), allocatable, intent(out) :: error
+    real(wp) :: diagonal(size(matrix, 1))
     integer :: failed_row, j, step
 
     jitter = 0.0_wp
+    diagonal = [(matrix(j, j), j=1, size(diagonal))]
     call factor_cholesky(matrix, failed_row)
     step = 0
     do while (failed_row /= 0)
@@ -40,7 +42,7 @@ contains
       end if
       ! The upper triangle still holds the matrix.
       do j = 1, size(matrix, 1)
-        matrix(j, j) = 1.0_wp + jitter
+        matrix(j, j) = diagonal(j) + jitter
         matrix(j + 1:, j) = matrix(j, j + 1:)
       end do
       call factor_cholesky(matrix, failed_row)

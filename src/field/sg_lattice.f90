@@ -27,6 +27,7 @@ module sg_lattice
   contains
     procedure :: init
     procedure :: find_order
+    procedure :: is_even
   end type lattice_t
 
 contains
@@ -110,6 +111,17 @@ contains
       first(site) = first(site) + 1
     end do
   end subroutine find_order
+
+  !> Are columns and rows evenly spaced, but for some that are missing?
+  pure logical function is_even(this)
+    class(lattice_t), intent(in) :: this
+    integer, allocatable :: place(:)
+    real(wp) :: spacing(2)
+
+    call find_spacing(this%x, spacing(1), place)
+    call find_spacing(this%y, spacing(2), place)
+    is_even = all(spacing >= 0.0_wp)
+  end function is_even
 
   !> Spacing of evenly spaced coordinates of which some may be missing (so the smallest gap), and
   !> the place of each on that grid, from 1. `spacing` is 0 for a single coordinate and -1 when

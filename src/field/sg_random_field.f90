@@ -1,75 +1,186 @@
-!> The random field of a material property: one value at each point's initial place.
+!> The random field of one property: its points, its law at each of them, its correlation. What
+!> makes Gaussian fields of several together is in sg_random_fields.
 module sg_random_field
   use sg_config, only: random_field_config_t
+  use sg_correlation, only: correlation_t
   use sg_errors, only: error_t
-  use sg_kinds, only: i8, wp
+  use sg_kinds, only: wp
   use sg_marginal, only: marginal_t
-  use sg_sampler, only: create_sampler, gaussian_sampler_t
+  use sg_polygon, only: polygon_contains
+  use sg_text, only: to_text
   implicit none
   private
 
-  public :: random_field_t
+  public :: field_points_t, random_field_t
+
+  !> The points of a material at the start.
+  type :: field_points_t
+    !> Places and sizes, in m, and the body of each, [n].
+    real(wp), allocatable :: x(:), y(:), width(:), height(:)
+    integer, allocatable :: body(:)
+  end type field_points_t
 
   type :: random_field_t
-    !> Its `description` and `jitter` belong in the log.
-    class(gaussian_sampler_t), allocatable :: sampler
-    type(marginal_t) :: marginal
+    type(random_field_config_t) :: config
+    type(correlation_t) :: correlation
+    !> Points of the field among those of its material, and their places in m, [n].
+    integer, allocatable :: points(:)
+    real(wp), allocatable :: x(:), y(:)
+    !> Width and height of its points, in m; of the first, where they differ.
+    real(wp) :: cell(2) = 0.0_wp
+    !> Mean and standard deviation at each point, [n], in the unit of the property.
+    real(wp), allocatable :: mean(:), sd(:)
+    !> Law of each point, [n], and the different laws.
+    integer, allocatable :: law(:)
+    type(marginal_t), allocatable :: laws(:)
+    !> Height at which depths begin, in m.
+    real(wp) :: datum = 0.0_wp
   contains
-    procedure :: init
+    procedure :: place
     procedure :: set_cov
-    procedure :: realize
+    procedure :: moments_at
+    procedure :: law_at
+    procedure :: transform
   end type random_field_t
 
 contains
 
-  !> `acf` and `cov` are those of the study case; the rest is from &random_field.
-  subroutine init(this, config, acf, cov, x, y, error)
+  !> Finds the points of the field. `error`: correlation as for sg_correlation.
+  subroutine place(this, config, acf, points, error)
     class(random_field_t), intent(inout) :: this
     type(random_field_config_t), intent(in) :: config
     !> One of ACF_NAMES of sg_autocorrelation.
     character(len=*), intent(in) :: acf
-    real(wp), intent(in) :: cov
-    !> Initial places of the points, [n], in m.
-    real(wp), intent(in) :: x(:), y(:)
+    !> Of its material.
+    type(field_points_t), intent(in) :: points
     type(error_t), allocatable, intent(out) :: error
+    integer :: i
 
-    call this%set_cov(config, cov, error)
-    if (allocated(error)) return
-    call create_sampler(config%method, acf, config%scale_x, config%scale_y, x, y, this%sampler, &
-      error)
-  end subroutine init
+    this%config = config
+    this%points = pack([(i, i=1, size(points%x))], [(is_covered(config, points, i), i=1, &
+      size(points%x))])
+    this%x = points%x(this%points)
+    this%y = points%y(this%points)
+    if (size(this%points) > 0) then
+      this%cell = [points%width(this%points(1)), points%height(this%points(1))]
+      this%datum = maxval(this%y + 0.5_wp*points%height(this%points))
+    end if
+    if (size(config%datum) > 0) this%datum = config%datum(1)
+    call this%correlation%init(acf, [config%scale_x, config%scale_y], error, config%smoothness, &
+      config%form == 'radial', config%rotation)
+    if (allocated(error) .or. config%averaging /= 'cell') return
+    call this%correlation%average_over(this%cell, error)
+  end subroutine place
 
-  !> Another coefficient of variation for the same Gaussian field, which need not be made anew.
-  subroutine set_cov(this, config, cov, error)
-    class(random_field_t), intent(inout) :: this
+  pure logical function is_covered(config, points, i)
     type(random_field_config_t), intent(in) :: config
+    type(field_points_t), intent(in) :: points
+    integer, intent(in) :: i
+
+    is_covered = config%body_index == 0 .or. points%body(i) == config%body_index
+    if (is_covered .and. size(config%region) > 0) is_covered = polygon_contains(config%region, &
+      points%x(i), points%y(i))
+  end function is_covered
+
+  !> The laws for a coefficient of variation; one that is not above 0 leaves that of the case or its
+  !> standard deviation. The Gaussian field stays as it is.
+  subroutine set_cov(this, cov, error)
+    class(random_field_t), intent(inout) :: this
     real(wp), intent(in) :: cov
     type(error_t), allocatable, intent(out) :: error
+    integer, allocatable :: first(:)
+    integer :: i, k
 
-    call this%marginal%init(config%distribution, config%mean, cov, config%lower, config%upper, &
-      error)
+    if (cov > 0.0_wp) this%config%cov = [cov]
+    if (.not. allocated(this%mean)) allocate (this%mean(size(this%x)), this%sd(size(this%x)), &
+      this%law(size(this%x)))
+    allocate (first(0))
+    do i = 1, size(this%x)
+      call this%moments_at(this%y(i), this%mean(i), this%sd(i))
+      ! Most points have the law of the one before.
+      k = 0
+      if (i > 1) then
+        k = this%law(i - 1)
+        if (abs(this%mean(i) - this%mean(i - 1)) > 0.0_wp .or. &
+          abs(this%sd(i) - this%sd(i - 1)) > 0.0_wp) k = 0
+      end if
+      this%law(i) = k
+      if (k > 0) cycle
+      do k = 1, size(first)
+        if (.not. abs(this%mean(i) - this%mean(first(k))) > 0.0_wp .and. &
+          .not. abs(this%sd(i) - this%sd(first(k))) > 0.0_wp) exit
+      end do
+      if (k > size(first)) first = [first, i]
+      this%law(i) = k
+    end do
+    if (allocated(this%laws)) deallocate (this%laws)
+    allocate (this%laws(size(first)))
+    do k = 1, size(first)
+      call init_law(this, this%mean(first(k)), this%sd(first(k)), this%laws(k), error)
+      if (allocated(error)) return
+    end do
   end subroutine set_cov
 
-  !> The field of one realization: a function of its arguments alone.
-  subroutine realize(this, seed, stream, realization, values, clipped_share, error)
+  subroutine init_law(this, mean, sd, law, error)
     class(random_field_t), intent(in) :: this
-    integer(i8), intent(in) :: seed
-    !> FIELD_STREAM of sg_philox.
-    integer, intent(in) :: stream
-    integer(i8), intent(in) :: realization
-    !> [n], in the order of the points, in the unit of the property.
-    real(wp), intent(out) :: values(:)
-    !> Share of the points whose value was set to a bound.
-    real(wp), intent(out) :: clipped_share
+    real(wp), intent(in) :: mean, sd
+    type(marginal_t), intent(out) :: law
     type(error_t), allocatable, intent(out) :: error
-    real(wp), allocatable :: z(:)
-    integer :: clipped
 
-    clipped_share = 0.0_wp
-    allocate (z(size(values)))
-    call this%sampler%sample(seed, stream, realization, z, error)
-    if (allocated(error)) return
-    call this%marginal%transform(z, values, clipped)
-    clipped_share = real(clipped, wp)/size(values)
-  end subroutine realize
+    call law%init(this%config%distribution, mean, sd, this%config%bounds(1), &
+      this%config%bounds(2), error)
+    if (allocated(error)) error%message = 'random field '//trim(this%config%name)// &
+      ', where its mean is '//to_text(mean, 4)//' and its standard deviation '//to_text(sd, 4)// &
+      ': '//error%message
+  end subroutine init_law
+
+  !> Mean and standard deviation at the height y, in the unit of the property: linear in the depth
+  !> below the datum.
+  pure subroutine moments_at(this, y, mean, sd)
+    class(random_field_t), intent(in) :: this
+    real(wp), intent(in) :: y
+    real(wp), intent(out) :: mean, sd
+
+    mean = this%config%mean + this%config%mean_gradient*(this%datum - y)
+    if (size(this%config%cov) > 0) then
+      sd = this%config%cov(1)*abs(mean)
+    else
+      sd = this%config%sd(1) + this%config%sd_gradient*(this%datum - y)
+    end if
+  end subroutine moments_at
+
+  !> The law at any height.
+  subroutine law_at(this, y, law, error)
+    class(random_field_t), intent(in) :: this
+    real(wp), intent(in) :: y
+    type(marginal_t), intent(out) :: law
+    type(error_t), allocatable, intent(out) :: error
+    real(wp) :: mean, sd
+
+    call this%moments_at(y, mean, sd)
+    call init_law(this, mean, sd, law, error)
+  end subroutine law_at
+
+  !> From Gaussian values to those of the property, [n]; `clipped` counts those set to a bound.
+  subroutine transform(this, z, values, clipped)
+    class(random_field_t), intent(in) :: this
+    real(wp), contiguous, intent(in) :: z(:)
+    real(wp), contiguous, intent(out) :: values(:)
+    integer, intent(out) :: clipped
+    integer :: first, last, here
+
+    clipped = 0
+    ! Runs of points with one law: rows of a body, or all of it.
+    first = 1
+    do while (first <= size(z))
+      last = first
+      do while (last < size(z))
+        if (this%law(last + 1) /= this%law(first)) exit
+        last = last + 1
+      end do
+      call this%laws(this%law(first))%transform(z(first:last), values(first:last), here)
+      clipped = clipped + here
+      first = last + 1
+    end do
+  end subroutine transform
 end module sg_random_field

@@ -4,6 +4,7 @@ module sg_bodies
   use sg_errors, only: error_t
   use sg_kinds, only: wp
   use sg_point_file, only: read_point_file
+  use sg_polygon, only: polygon_contains
   implicit none
   private
 
@@ -107,29 +108,17 @@ contains
     end function whole_number
   end subroutine fill_shape
 
-  !> Is (x, y) in the body? A body given by points has no inside. For polygons by the number of
-  !> edges crossed to the right (even-odd rule).
+  !> Is (x, y) in the body? A body given by points has no inside.
   pure function is_inside(body, x, y) result(inside)
     type(body_config_t), intent(in) :: body
     real(wp), intent(in) :: x, y
     logical :: inside
-    real(wp) :: x1, y1, x2, y2
-    integer :: k, corners
 
     select case (body%shape)
     case ('disc')
       inside = (x - body%x)**2 + (y - body%y)**2 <= body%radius**2
     case ('polygon')
-      inside = .false.
-      corners = size(body%vertices)/2
-      do k = 1, corners
-        x1 = body%vertices(2*k - 1)
-        y1 = body%vertices(2*k)
-        x2 = body%vertices(2*mod(k, corners) + 1)
-        y2 = body%vertices(2*mod(k, corners) + 2)
-        if ((y1 > y) .eqv. (y2 > y)) cycle
-        if (x < x1 + (y - y1)/(y2 - y1)*(x2 - x1)) inside = .not. inside
-      end do
+      inside = polygon_contains(body%vertices, x, y)
     case ('points')
       inside = .false.
     case default

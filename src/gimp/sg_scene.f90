@@ -168,7 +168,7 @@ contains
       p%bodies(k)%width = lattice%width
       p%bodies(k)%height = lattice%height
       if (config%has_random_field) then
-        p%bodies(k)%is_measured = material == config%random_field%material_index
+        p%bodies(k)%is_measured = any(config%random_fields%material_index == material)
       end if
       p%x(first:last) = lattice%x
       p%y(first:last) = lattice%y

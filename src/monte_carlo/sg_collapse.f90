@@ -3,20 +3,24 @@
 module sg_collapse
   use sg_config, only: config_t
   use sg_errors, only: error_t
+  use sg_field_properties, only: compose_properties, points_of_materials, units_of
+  use sg_field_record, only: field_file_t, field_record_t, made_by_t
   use sg_kinds, only: i8, wp
   use sg_materials, only: MODEL_MOHR_COULOMB
   use sg_member_model, only: member_model_t
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
-  use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, outcome_t, reset_outcome, STATUS_ABANDONED, &
-    STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, status_text, STEPS
+  use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, FIELD_MAX, FIELD_MEAN, FIELD_MIN, outcome_t, &
+    reset_outcome, STATUS_ABANDONED, STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, &
+    status_text, STEPS
   use sg_posix, only: write_file
   use sg_resolved, only: resolved_text
   use sg_snapshot, only: snapshot_name
-  use sg_philox, only: FIELD_STREAM, fill_uniform, NOISE_STREAM
+  use sg_philox, only: fill_uniform, NOISE_STREAM
   use sg_plan, only: plan_t
   use sg_property, only: PROPERTY_FRICTION_ANGLE
-  use sg_random_field, only: random_field_t
+  use sg_random_field, only: field_points_t
+  use sg_random_fields, only: field_values_t, follows_study, random_fields_t
   use sg_recorder, only: recorder_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
@@ -25,21 +29,22 @@ module sg_collapse
   implicit none
   private
 
-  public :: collapse_model_t
+  public :: collapse_model_t, open_files
 
   !> Homogeneous members beyond the first: CFL number within +-20 %, lines of the grid shifted by up
-  !> to a cell at the toe, friction within 1e-6. None of it means anything physically; the spread it
-  !> makes is the noise floor.
+  !> to a cell at the toe, properties within 1e-6. None of it means anything physically; the spread
+  !> it makes is the noise floor.
   real(wp), parameter :: STEP_SPREAD = 0.2_wp
-  real(wp), parameter :: FRICTION_SPREAD = 1.0e-6_wp
+  real(wp), parameter :: PROPERTY_SPREAD = 1.0e-6_wp
 
   type, extends(member_model_t) :: collapse_model_t
     type(config_t) :: config
     type(plan_t) :: plan
     type(scene_t) :: scene
-    !> One Gaussian field for each ACF of the study; the coefficient of variation is set for each
-    !> member.
-    type(random_field_t), allocatable :: fields(:)
+    !> The points of each material, and the fields for each ACF of the study; the coefficient of
+    !> variation is set for each member.
+    type(field_points_t), allocatable :: points(:)
+    type(random_fields_t), allocatable :: fields(:)
     !> Record every member, with snapshots at their interval (replays).
     logical :: record_all = .false.
     !> Record none, whatever the configuration says (replays without snapshots).
@@ -48,6 +53,8 @@ module sg_collapse
     procedure :: init => init_collapse
     procedure :: run => run_collapse
     procedure :: field_method
+    procedure :: field_records
+    procedure :: make_fields
     procedure, private :: vary_homogeneous
     procedure, private :: vary_by_field
     procedure, private :: is_recorded
@@ -63,25 +70,30 @@ contains
     type(config_t), intent(in) :: config
     type(plan_t), intent(in) :: plan
     type(error_t), allocatable, intent(out) :: error
-    integer :: k
-    real(wp), allocatable :: x(:), y(:)
+    integer :: j, k
 
     this%config = config
     this%plan = plan
     call build_scene(config, this%scene, error)
     if (allocated(error)) return
     if (.not. config%has_random_field) return
-    call this%scene%points_of(config%random_field%material_index, x, y)
+    this%points = points_of_materials(this%scene)
     allocate (this%fields(size(config%study%acf)))
     do k = 1, size(this%fields)
-      call this%fields(k)%init(config%random_field, trim(config%study%acf(k)), &
-        config%study%cov(1), x, y, error)
+      call this%fields(k)%prepare(config, trim(config%study%acf(k)), config%study%cov(1), &
+        this%points, error)
+      ! What is wrong with one of the laws is told now, and not by members that fail.
+      do j = size(config%study%cov), 1, -1
+        if (.not. allocated(error)) call this%fields(k)%set_cov(config%study%cov(j), error)
+      end do
+      if (.not. allocated(error)) call open_files(this%fields(k), &
+        config%monte_carlo%realizations, error)
+      if (.not. allocated(error)) call this%fields(k)%build(error)
       if (allocated(error)) return
     end do
   end subroutine init_collapse
 
-  !> How the fields are sampled, with the jitter of each factor that needed one; empty without a
-  !> field.
+  !> How the fields are sampled, with what was conceded for each ACF; empty without a field.
   function field_method(this) result(text)
     class(collapse_model_t), intent(in) :: this
     character(len=:), allocatable :: text
@@ -89,13 +101,82 @@ contains
 
     text = ''
     if (.not. allocated(this%fields)) return
-    text = this%fields(1)%sampler%description
-    do k = 1, size(this%fields)
-      if (.not. this%fields(k)%sampler%jitter > 0.0_wp) cycle
-      text = text//'; '//trim(this%config%study%acf(k))//' is near-singular, jitter '// &
-        to_text(this%fields(k)%sampler%jitter, 2)//' on the diagonal'
+    text = this%fields(1)%describe()
+    do k = 2, size(this%fields)
+      if (this%fields(k)%describe() /= this%fields(1)%describe()) text = text//'; '// &
+        trim(this%config%study%acf(k))//': '//this%fields(k)%describe()
     end do
   end function field_method
+
+  !> The fields, for files; size 0 without one.
+  function field_records(this) result(records)
+    class(collapse_model_t), intent(in) :: this
+    type(field_record_t), allocatable :: records(:)
+    integer :: j, k
+
+    if (.not. allocated(this%fields)) then
+      allocate (records(0))
+      return
+    end if
+    allocate (records(size(this%fields(1)%fields)))
+    do k = 1, size(records)
+      associate (r => records(k), field => this%fields(1)%fields(k))
+        r%index = k
+        r%name = trim(field%config%name)
+        r%property = trim(field%config%property)
+        r%material = trim(field%config%material)
+        r%units = units_of(r%property)
+        r%x = field%x
+        r%y = field%y
+        r%width = this%points(field%config%material_index)%width(field%points)
+        r%height = this%points(field%config%material_index)%height(field%points)
+        r%mean = field%mean
+        r%sd = field%sd
+        r%data = this%fields(1)%data%of_field(k)
+        allocate (r%made_by(merge(size(this%fields), 1, follows_study(this%config, k))))
+        do j = 1, size(r%made_by)
+          r%made_by(j) = way_of(this%fields(j), k)
+        end do
+      end associate
+    end do
+  end function field_records
+
+  !> How field `k` is made.
+  function way_of(fields, k) result(way)
+    type(random_fields_t), intent(in) :: fields
+    integer, intent(in) :: k
+    type(made_by_t) :: way
+
+    way%acf = trim(fields%fields(k)%correlation%acf%name)
+    way%method = 'file'
+    allocate (way%jitters(0))
+    if (fields%sampler_of(k) == 0) return
+    associate (sampler => fields%samplers(fields%sampler_of(k))%sampler)
+      way%method = sampler%method
+      way%jitters = sampler%jitters
+      way%ring = sampler%ring
+    end associate
+  end function way_of
+
+  !> Opens the files of the fields that are not sampled.
+  subroutine open_files(fields, realizations, error)
+    type(random_fields_t), intent(inout) :: fields
+    integer, intent(in) :: realizations
+    type(error_t), allocatable, intent(out) :: error
+    type(field_file_t), allocatable :: file
+    integer :: k
+
+    do k = 1, size(fields%fields)
+      associate (field => fields%fields(k))
+        if (field%config%file == '') cycle
+        allocate (file)
+        call file%open_fields(field%config%file, trim(field%config%name), field%x, field%y, &
+          realizations, error)
+        if (allocated(error)) return
+        call move_alloc(file, fields%supplies(k)%supply)
+      end associate
+    end do
+  end subroutine open_files
 
   !> One member; see member_model_t.
   subroutine run_collapse(this, case_index, id, monitor, outcome)
@@ -108,14 +189,13 @@ contains
     type(recorder_t) :: recorder
     type(blind_observer_t) :: nobody
     type(error_t), allocatable :: error
-    real(wp) :: clipped
+    type(field_values_t), allocatable :: values(:)
 
     call reset_outcome(outcome, case_index, id, size(this%scene%profile_x))
-    clipped = 0.0_wp
     if (this%plan%cases(case_index)%is_homogeneous) then
-      call this%vary_homogeneous(case_index, id, variation)
+      call this%vary_homogeneous(id, variation, values)
     else
-      call this%vary_by_field(case_index, id, variation, clipped, error)
+      call this%vary_by_field(case_index, id, variation, values, error)
     end if
     if (allocated(error)) then
       outcome%status = STATUS_FIELD_FAILED
@@ -142,7 +222,7 @@ contains
     if (outcome%values(FAILURE_STEP) > 0.0_wp .and. .not. this%record_nothing) then
       call this%keep_capsule(case_index, id, variation, monitor, outcome)
     end if
-    outcome%values(FIELD_CLIPPED) = clipped
+    if (allocated(values)) call describe_field(values(1), outcome)
   end subroutine run_collapse
 
   !> What a failed member leaves in DIR/failures: its first and its last good state (the step before
@@ -188,66 +268,91 @@ contains
       error%message//')'
   end subroutine keep_capsule
 
-  !> Member 1 is nominal, the others differ by what means nothing. With a random field, the
-  !> strength is its mean.
-  subroutine vary_homogeneous(this, case_index, id, variation)
+  !> The columns that say what the first field was like.
+  subroutine describe_field(field, outcome)
+    type(field_values_t), intent(in) :: field
+    type(outcome_t), intent(inout) :: outcome
+
+    outcome%values(FIELD_MEAN) = sum(field%values)/size(field%values)
+    outcome%values(FIELD_MIN) = minval(field%values)
+    outcome%values(FIELD_MAX) = maxval(field%values)
+    outcome%values(FIELD_CLIPPED) = field%clipped_share
+  end subroutine describe_field
+
+  !> Member 1 is nominal, the others differ by what means nothing. With random fields, properties
+  !> have their means.
+  subroutine vary_homogeneous(this, id, variation, values)
     class(collapse_model_t), intent(in) :: this
-    integer, intent(in) :: case_index
     integer(i8), intent(in) :: id
     type(variation_t), intent(inout) :: variation
-    real(wp) :: u(3), friction
-    integer :: material
+    !> Not allocated without a random field.
+    type(field_values_t), allocatable, intent(out) :: values(:)
+    real(wp) :: u(3), strength
+    integer :: k, material
 
-    friction = 1.0_wp
+    strength = 1.0_wp
     if (id > 1) then
       call fill_uniform(this%config%monte_carlo%seed, NOISE_STREAM, id, 0_i8, u)
       variation%step_factor = 1.0_wp + STEP_SPREAD*(2.0_wp*u(1) - 1.0_wp)
       if (this%scene%is_clear_of_far_walls) variation%cell_stretch = u(2) &
         *this%config%grid%cell_size/(this%scene%extent(2) - this%config%grid%x_min)
-      friction = 1.0_wp + FRICTION_SPREAD*(2.0_wp*u(3) - 1.0_wp)
+      strength = 1.0_wp + PROPERTY_SPREAD*(2.0_wp*u(3) - 1.0_wp)
     end if
-    material = this%config%bodies(1)%material_index
-    if (this%config%has_random_field) material = this%config%random_field%material_index
     if (this%config%has_random_field) then
-      friction = friction*this%plan%cases(case_index)%mean
-    else if (id > 1 .and. this%scene%materials(material)%model == MODEL_MOHR_COULOMB) then
-      friction = friction*this%scene%materials(material)%friction_angle
-    else
+      allocate (values(size(this%fields(1)%fields)))
+      do k = 1, size(values)
+        values(k)%values = strength*this%fields(1)%fields(k)%mean
+      end do
+      call compose_properties(this%config, this%fields(1)%fields, values, this%points, &
+        variation%properties)
       return
     end if
+    material = this%config%bodies(1)%material_index
+    if (id == 1 .or. this%scene%materials(material)%model /= MODEL_MOHR_COULOMB) return
     allocate (variation%properties(1))
     associate (one => variation%properties(1))
       one%property = PROPERTY_FRICTION_ANGLE
       one%material = material
-      allocate (one%values(this%scene%point_count(material)), source=friction)
+      allocate (one%values(this%scene%point_count(material)), &
+        source=strength*this%scene%materials(material)%friction_angle)
     end associate
   end subroutine vary_homogeneous
 
-  !> The friction angles of realization `id`.
-  subroutine vary_by_field(this, case_index, id, variation, clipped, error)
+  !> The properties of realization `id`.
+  subroutine vary_by_field(this, case_index, id, variation, values, error)
     class(collapse_model_t), intent(inout) :: this
     integer, intent(in) :: case_index
     integer(i8), intent(in) :: id
     type(variation_t), intent(inout) :: variation
-    real(wp), intent(out) :: clipped
+    type(field_values_t), allocatable, intent(out) :: values(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(field_values_t), allocatable :: block(:, :)
+
+    call this%make_fields(case_index, id, 1, block, error)
+    if (allocated(error)) return
+    values = block(:, 1)
+    call compose_properties(this%config, this%fields(1)%fields, values, this%points, &
+      variation%properties)
+  end subroutine vary_by_field
+
+  !> The fields of `count` realizations of a study case from `first` on, [fields, count].
+  subroutine make_fields(this, case_index, first, count, values, error)
+    class(collapse_model_t), intent(inout) :: this
+    integer, intent(in) :: case_index, count
+    integer(i8), intent(in) :: first
+    type(field_values_t), allocatable, intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
-    clipped = 0.0_wp
-    associate (one => this%plan%cases(case_index), field => this%config%random_field)
+    associate (one => this%plan%cases(case_index))
       do k = 1, size(this%fields)
         if (this%config%study%acf(k) == one%acf) exit
       end do
-      call this%fields(k)%set_cov(field, one%cov, error)
-      if (allocated(error)) return
-      allocate (variation%properties(1))
-      variation%properties(1)%property = PROPERTY_FRICTION_ANGLE
-      variation%properties(1)%material = field%material_index
-      allocate (variation%properties(1)%values(this%scene%point_count(field%material_index)))
-      call this%fields(k)%realize(this%config%monte_carlo%seed, FIELD_STREAM, id, &
-                                  variation%properties(1)%values, clipped, error)
+      call this%fields(k)%set_cov(one%cov, error)
+      if (.not. allocated(error)) call this%fields(k)%realize_block(first, &
+        count, values, error)
     end associate
-  end subroutine vary_by_field
+  end subroutine make_fields
 
   !> Members that were asked for; without a random field the nominal run, if anything is to be
   !> recorded at all.

@@ -6,6 +6,7 @@ module sg_driver
   use sg_ensemble, only: ENSEMBLE_NAME
   use sg_errors, only: error_t, EXIT_BAD_INPUT, EXIT_OK, EXIT_STOPPED_EARLY, &
     EXIT_TOO_MANY_FAILED, raise
+  use sg_field_record, only: field_record_t
   use sg_journal, only: damage_t
   use sg_kinds, only: i8, wp
   use sg_member_model, only: member_model_t
@@ -45,6 +46,8 @@ module sg_driver
     character(len=:), allocatable :: case_text, resolved
     !> How the fields are sampled, and the jitter that their factors needed: one line, may be empty.
     character(len=:), allocatable :: field_method
+    !> The fields themselves; size 0 or not allocated without any.
+    type(field_record_t), allocatable :: fields(:)
     !> Initial toe, from which runouts are measured, and extent of the body, and the spacing of
     !> points, in m.
     real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
@@ -148,6 +151,10 @@ contains
     associate (record => director%record, config => request%config)
       record%case_text = request%case_text
       record%resolved = request%resolved
+      allocate (record%fields(0))
+      if (allocated(request%fields)) record%fields = request%fields
+      record%sampling = ''
+      if (config%has_random_field) record%sampling = trim(config%monte_carlo%sampling)
       record%field_method = ''
       if (allocated(request%field_method)) record%field_method = request%field_method
       record%host = host_name()
@@ -178,10 +185,11 @@ contains
         r%mean = c%mean
         r%is_homogeneous = c%is_homogeneous
         r%distribution = ''
+        if (size(director%record%fields) > 0) r%field_units = director%record%fields(1)%units
         if (c%is_homogeneous .or. .not. request%config%has_random_field) cycle
-        r%distribution = trim(request%config%random_field%distribution)
-        r%scale_x = request%config%random_field%scale_x
-        r%scale_y = request%config%random_field%scale_y
+        r%distribution = trim(request%config%random_fields(1)%distribution)
+        r%scale_x = request%config%random_fields(1)%scale_x
+        r%scale_y = request%config%random_fields(1)%scale_y
       end associate
     end do
   end subroutine set_up

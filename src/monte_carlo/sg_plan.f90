@@ -54,7 +54,7 @@ contains
         associate (c => plan%cases(next))
           c%acf = config%study%acf(i)
           c%cov = config%study%cov(j)
-          c%mean = config%random_field%mean
+          c%mean = config%random_fields(1)%mean
           c%member_count = config%monte_carlo%realizations
           c%label = 'base'
           if (config%has_study) c%label = case_label(c%acf, c%cov)
@@ -72,13 +72,13 @@ contains
     one%is_homogeneous = .true.
     one%member_count = max(1, config%monte_carlo%noise_members)
     if (config%has_random_field) then
-      one%mean = config%random_field%mean
+      one%mean = config%random_fields(1)%mean
     else if (size(config%materials) > 0) then
       one%mean = config%materials(1)%friction_angle
     end if
   end function homogeneous_case
 
-  !> `snx_cov0.05`: at least two decimals, more where the value has them.
+  !> `snx_cov0.05`: at least two decimals, more where the value has them; `snx` without a COV.
   pure function case_label(acf, cov) result(label)
     character(len=*), intent(in) :: acf
     real(wp), intent(in) :: cov
@@ -86,6 +86,8 @@ contains
     character(len=:), allocatable :: number
     integer :: mark
 
+    label = trim(acf)
+    if (.not. cov > 0.0_wp) return
     number = to_text(cov)
     if (scan(number, 'eE') == 0) then
       mark = index(number, '.')

@@ -2,9 +2,10 @@
 !> the place of the old one, so that the file that is there can always be opened.
 module sg_ensemble
   use sg_errors, only: error_t
+  use sg_field_record, only: field_record_t, write_field_records
   use sg_hdf5_file, only: hdf5_file_t
   use sg_kinds, only: i4, i8, sp, wp
-  use sg_outcome, only: COLUMN_COUNT, COLUMNS, outcome_t
+  use sg_outcome, only: COLUMN_COUNT, COLUMNS, FIELD_MAX, FIELD_MEAN, FIELD_MIN, outcome_t
   use sg_posix, only: replace_file
   use sg_version, only: COMPILER, COMPILER_FLAGS, GIT_DIRTY, GIT_HASH, LIBRARIES, VERSION
   implicit none
@@ -18,6 +19,8 @@ module sg_ensemble
   !> The members of one study case that are there, at the position of their id.
   type :: case_results_t
     character(len=:), allocatable :: label, acf, distribution
+    !> Of the property of the first random field.
+    character(len=:), allocatable :: field_units
     real(wp) :: cov = 0.0_wp, mean = 0.0_wp, scale_x = 0.0_wp, scale_y = 0.0_wp
     logical :: is_homogeneous = .false.
     !> [members]
@@ -35,8 +38,8 @@ module sg_ensemble
   !> What the root of the file says of the run.
   type :: run_record_t
     character(len=:), allocatable :: case_text, resolved, host, started, ended, state, config_hash
-    !> How the fields were sampled; empty for a deterministic run.
-    character(len=:), allocatable :: field_method
+    !> How the fields were sampled, and the plan of the members; empty for a deterministic run.
+    character(len=:), allocatable :: field_method, sampling
     integer(i8) :: seed = 0
     integer :: ranks = 1, realizations = 0
     real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
@@ -44,6 +47,8 @@ module sg_ensemble
     real(wp) :: cell_size = 0.0_wp, point_spacing = 0.0_wp
     !> Cell centres of the columns of the profile, in m.
     real(wp), allocatable :: profile_x(:)
+    !> The random fields; size 0 for a deterministic run.
+    type(field_record_t), allocatable :: fields(:)
   end type run_record_t
 
 contains
@@ -95,6 +100,7 @@ contains
     if (allocated(error)) return
     call write_provenance(file, record)
     call write_geometry(file, record)
+    call write_field_records(file, record%fields)
     call file%make_group('/cases')
     do i = 1, size(results)
       call write_case(file, results(i), i, record%profile_x)
@@ -115,6 +121,7 @@ contains
     call file%set('/', 'compiler_flags', COMPILER_FLAGS)
     call file%set('/', 'libraries', LIBRARIES)
     if (record%field_method /= '') call file%set('/', 'field_method', record%field_method)
+    if (record%sampling /= '') call file%set('/', 'sampling', record%sampling)
     call file%set('/', 'host', record%host)
     call file%set('/', 'ranks', int(record%ranks, i4))
     call file%set('/', 'started', record%started)
@@ -180,7 +187,11 @@ contains
     call file%write(group//'/id', int(rows, i8), '1')
     call file%write(group//'/status', results%status(rows), '1')
     do i = 1, COLUMN_COUNT
-      call write_column(file, group, i, results%values(i, rows))
+      if (any(i == [FIELD_MEAN, FIELD_MIN, FIELD_MAX]) .and. allocated(results%field_units)) then
+        call write_column(file, group, i, results%field_units, results%values(i, rows))
+      else
+        call write_column(file, group, i, trim(COLUMNS(i)%units), results%values(i, rows))
+      end if
     end do
     call file%write(group//'/reason', results%reason(rows), '1')
     call file%make_group(group//'/profile')
@@ -188,15 +199,15 @@ contains
     call file%write(group//'/profile/height', results%height(:, rows), 'm')
   end subroutine write_case
 
-  subroutine write_column(file, group, column, values)
+  subroutine write_column(file, group, column, units, values)
     type(hdf5_file_t), intent(inout) :: file
     character(len=*), intent(in) :: group
     integer, intent(in) :: column
+    character(len=*), intent(in) :: units
     real(wp), intent(in) :: values(:)
-    character(len=:), allocatable :: name, units
+    character(len=:), allocatable :: name
 
     name = group//'/'//trim(COLUMNS(column)%name)
-    units = trim(COLUMNS(column)%units)
     if (COLUMNS(column)%is_integer) then
       call file%write(name, nint(values, i8), units)
     else

@@ -1,29 +1,33 @@
 !> Cost of random fields, made as the Monte-Carlo driver makes them: for each autocorrelation
 !> function and method, and where the time goes.
-!> Usage: bench_fields CASE.nml [fields [dense fields]]. Every figure is in seconds of processor
+!> Usage: bench_fields CASE.nml [fields [dense fields]], or bench_fields CASE.nml fields METHOD for
+!> the correlation of the case and one method only. Every figure is in seconds of processor
 !> time per 1000 fields, the least and the most of five repeats; the parts run apart, so their sum
 !> is not the whole. Dense fields: repeats of method='cholesky' (0: none), whose matrix of n x n
-!> numbers must fit in memory. Judges nothing.
+!> numbers must fit in memory, one by one and MEMBERS_AT_ONCE together. Judges nothing.
 program bench_fields
   use case_file, only: read_case, stop_on_error
   use sg_autocorrelation, only: ACF_NAMES
   use sg_config, only: config_t
   use sg_errors, only: error_t
+  use sg_field_properties, only: points_of_materials
   use sg_kinds, only: i8, wp
   use sg_linear_algebra, only: multiply_from_left, multiply_from_right_transposed
   use sg_marginal, only: marginal_t
   use sg_philox, only: FIELD_STREAM, fill_uniform, fill_words
-  use sg_random_field, only: random_field_t
-  use sg_sampler, only: estimate_sampler_memory
+  use sg_random_field, only: field_points_t
+  use sg_random_fields, only: field_values_t, random_fields_t
   use sg_scene, only: build_scene, scene_t
   use sg_special_functions, only: normal_quantile
-  use sg_white_noise, only: fill_white_noise
+  use sg_white_noise, only: fill_white_noise, noise_source_t, PLAN_LATIN_HYPERCUBE
   implicit none
 
   integer, parameter :: REPEATS = 5, MEMBERS_AT_ONCE = 16
-  character(len=26), parameter :: PART_NAMES(8) = [character(len=26) :: 'random words', &
+  character(len=26), parameter :: PART_NAMES(9) = [character(len=26) :: 'random words', &
     'uniform numbers', 'normal numbers by GSL', 'normal numbers', 'triangular products', &
-    'products, 16 members', 'normal marginal', 'lognormal marginal']
+    'products, 16 members', 'normal marginal', 'lognormal marginal', 'normal numbers, hypercube']
+  !> Of 'matern', unless the case has another.
+  real(wp), parameter :: SMOOTHNESS = 1.2_wp
 
   type :: parts_t
     integer(i8), allocatable :: words(:)
@@ -32,28 +36,39 @@ program bench_fields
     real(wp), allocatable :: factor(:, :), noise(:, :), wide(:, :), tall(:, :)
     real(wp), allocatable :: z(:)
     type(marginal_t) :: normal, lognormal
+    type(noise_source_t) :: hypercube
   end type parts_t
 
   type(config_t) :: config
   type(scene_t) :: scene
   type(error_t), allocatable :: error
-  real(wp), allocatable :: x(:), y(:), values(:)
+  type(field_points_t), allocatable :: points(:)
+  real(wp), allocatable :: values(:)
+  character(len=:), allocatable :: only
   integer :: fields, dense_fields, k
 
   call read_arguments()
   call build_scene(config, scene, error)
   call stop_on_error(error)
-  call scene%points_of(config%random_field%material_index, x, y)
-  allocate (values(size(x)))
-  print '(a, i0)', 'points ', size(x)
-  do k = 1, size(ACF_NAMES)
-    call time_method('kronecker', ACF_NAMES(k), fields)
-  end do
-  do k = 1, size(ACF_NAMES)
-    call time_method('circulant', ACF_NAMES(k), fields)
-  end do
-  if (dense_fields > 0) call time_method('cholesky', config%random_field%acf, dense_fields)
-  call time_parts()
+  allocate (points, source=points_of_materials(scene))
+  allocate (values(size(points(config%random_fields(1)%material_index)%x)))
+  print '(a, i0)', 'points ', size(values)
+  if (only /= '') then
+    call time_method(only, trim(config%random_fields(1)%acf), fields, 1)
+  else
+    do k = 1, size(ACF_NAMES)
+      call time_method('kronecker', ACF_NAMES(k), fields, 1)
+    end do
+    do k = 1, size(ACF_NAMES)
+      call time_method('circulant', ACF_NAMES(k), fields, 1)
+    end do
+    if (dense_fields > 0) then
+      call time_method('cholesky', trim(config%random_fields(1)%acf), dense_fields, 1)
+      call time_method('cholesky', trim(config%random_fields(1)%acf), MEMBERS_AT_ONCE, &
+        MEMBERS_AT_ONCE)
+    end if
+    call time_parts()
+  end if
 
 contains
 
@@ -71,37 +86,51 @@ contains
     if (argument /= '') read (argument, *) fields
     dense_fields = 0
     call get_command_argument(3, argument)
-    if (argument /= '') read (argument, *) dense_fields
+    only = ''
+    if (verify(trim(argument), '0123456789') > 0) then
+      only = trim(argument)
+    else if (argument /= '') then
+      read (argument, *) dense_fields
+    end if
+    associate (field => config%random_fields(1))
+      if (.not. field%smoothness > 0.0_wp) field%smoothness = SMOOTHNESS
+    end associate
   end subroutine read_arguments
 
-  !> Making the factors (once per rank), and the fields of `count` members.
-  subroutine time_method(method, acf, count)
+  !> Making the factors (once per rank), and the fields of `count` members, so many at a time.
+  subroutine time_method(method, acf, count, together)
     character(len=*), intent(in) :: method, acf
-    integer, intent(in) :: count
-    type(random_field_t) :: field
+    integer, intent(in) :: count, together
+    type(random_fields_t) :: made
+    type(field_values_t), allocatable :: results(:, :)
+    character(len=:), allocatable :: name
     character(len=:), allocatable :: description
-    real(wp) :: started, ended, seconds(REPEATS), clipped, setup
+    real(wp) :: started, ended, seconds(REPEATS), setup
     integer(i8) :: bytes, id
     integer :: repeat
 
-    config%random_field%method = method
-    call estimate_sampler_memory(method, x, y, bytes, description, error)
-    call stop_on_error(error)
+    config%random_fields(1)%method = method
     call cpu_time(started)
-    call field%init(config%random_field, trim(acf), config%random_field%cov, x, y, error)
+    call made%prepare(config, trim(acf), config%study%cov(1), points, error)
+    call stop_on_error(error)
+    call made%build(error)
     call stop_on_error(error)
     call cpu_time(ended)
+    call made%estimate(bytes, description, error)
+    call stop_on_error(error)
     setup = ended - started
     do repeat = 1, REPEATS
       call cpu_time(started)
-      do id = 1, count
-        call field%realize(config%monte_carlo%seed, FIELD_STREAM, id, values, clipped, error)
+      do id = 1, count, together
+        call made%realize_block(id, together, results, error)
         call stop_on_error(error)
       end do
       call cpu_time(ended)
       seconds(repeat) = (ended - started)*1000/count
     end do
-    print '(a, 1x, a, 2(a, f9.3), a, f8.3, a, i0)', method, trim(acf), ' least ', &
+    name = method
+    if (together > 1) name = method//'_together'
+    print '(a, 1x, a, 2(a, f9.3), a, f8.3, a, i0)', name, trim(acf), ' least ', &
       minval(seconds), ' most ', maxval(seconds), ' setup ', setup, ' bytes ', bytes
   end subroutine time_method
 
@@ -131,18 +160,22 @@ contains
 
   subroutine prepare_parts(parts)
     type(parts_t), intent(out) :: parts
+    real(wp) :: sd
     integer :: n
 
-    n = nint(sqrt(real(size(x), wp)))
+    n = nint(sqrt(real(size(values), wp)))
     allocate (parts%words(n*n), parts%factor(n, n), parts%noise(n, n), parts%z(n*n))
+    parts%noise = 1.0_wp
     allocate (parts%wide(n, n*MEMBERS_AT_ONCE), parts%tall(n*MEMBERS_AT_ONCE, n))
     parts%factor = 1.0_wp/n
     parts%wide = 1.0_wp
     parts%tall = 1.0_wp
-    associate (law => config%random_field)
-      call parts%normal%init('normal', law%mean, law%cov, law%lower, law%upper, error)
+    parts%hypercube = noise_source_t(1_i8, PLAN_LATIN_HYPERCUBE, int(fields, i8))
+    associate (law => config%random_fields(1))
+      sd = 0.1_wp*law%mean
+      call parts%normal%init('normal', law%mean, sd, law%bounds(1), law%bounds(2), error)
       call stop_on_error(error)
-      call parts%lognormal%init('lognormal', law%mean, law%cov, law%lower, law%upper, error)
+      call parts%lognormal%init('lognormal', law%mean, sd, law%bounds(1), law%bounds(2), error)
       call stop_on_error(error)
     end associate
   end subroutine prepare_parts
@@ -163,7 +196,7 @@ contains
       call fill_uniform(1_i8, FIELD_STREAM, id, 0_i8, parts%z)
       parts%z = [(normal_quantile(parts%z(i)), i=1, size(parts%z))]
     case (4)
-      call fill_white_noise(1_i8, FIELD_STREAM, id, parts%noise)
+      call fill_white_noise(1_i8, FIELD_STREAM, id, parts%z)
     case (5)
       call multiply_from_left(parts%factor, parts%noise)
       call multiply_from_right_transposed(parts%factor, parts%noise)
@@ -175,8 +208,10 @@ contains
       parts%tall = parts%tall + 1.0_wp
     case (7)
       call parts%normal%transform(parts%z, values, clipped)
-    case default
+    case (8)
       call parts%lognormal%transform(parts%z, values, clipped)
+    case default
+      call parts%hypercube%fill(FIELD_STREAM, id, parts%z)
     end select
   end subroutine do_part
 end program bench_fields

@@ -6,13 +6,13 @@ program bench_startup
   use sg_collapse, only: collapse_model_t
   use sg_config, only: config_t
   use sg_errors, only: error_t
+  use sg_field_properties, only: compose_properties
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: outcome_t, reset_outcome, STEPS
-  use sg_philox, only: FIELD_STREAM
   use sg_plan, only: create_plan, plan_t
-  use sg_property, only: PROPERTY_FRICTION_ANGLE
+  use sg_random_fields, only: field_values_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
   use sg_variation, only: variation_t
@@ -73,31 +73,26 @@ contains
   function field_seconds() result(seconds)
     real(wp) :: seconds
     type(variation_t) :: variation
-    real(wp) :: started, clipped
+    real(wp) :: started
     integer :: k
 
     call cpu_time(started)
     do k = 1, REPEATS
-      call draw(int(k, i8), variation, clipped)
+      call draw(int(k, i8), variation)
     end do
     call cpu_time(seconds)
     seconds = (seconds - started)/REPEATS
   end function field_seconds
 
-  subroutine draw(id, variation, clipped)
+  subroutine draw(id, variation)
     integer(i8), intent(in) :: id
     type(variation_t), intent(out) :: variation
-    real(wp), intent(out) :: clipped
+    type(field_values_t), allocatable :: values(:)
 
-    allocate (variation%properties(1))
-    associate (one => variation%properties(1))
-      one%property = PROPERTY_FRICTION_ANGLE
-      one%material = config%random_field%material_index
-      allocate (one%values(model%scene%point_count(one%material)))
-      call model%fields(1)%realize(config%monte_carlo%seed, FIELD_STREAM, id, one%values, &
-        clipped, error)
-    end associate
+    call model%fields(1)%realize(id, values, error)
     call stop_on_error(error)
+    call compose_properties(config, model%fields(1)%fields, values, model%points, &
+      variation%properties)
   end subroutine draw
 
   !> A member that ends after `last_step`, without its field.
@@ -108,10 +103,10 @@ contains
     type(patient_monitor_t) :: monitor
     type(blind_observer_t) :: observer
     type(outcome_t) :: outcome
-    real(wp) :: started, clipped
+    real(wp) :: started
     integer :: k
 
-    call draw(1_i8, variation, clipped)
+    call draw(1_i8, variation)
     variation%last_step = last_step
     call cpu_time(started)
     do k = 1, repeats

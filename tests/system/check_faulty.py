@@ -1,8 +1,10 @@
 """Every case file of faulty/ is refused as its first lines say:
 
     ! expect: <line>: <part of the message>
+    ! expect in STEM.csv: <line>: <part of the message>
 
-with exit code 2, each message once (only one rank speaks), and nothing written. `line` counts in the file itself.
+with exit code 2, each message once (only one rank speaks), and nothing written. `line` counts in the file itself,
+or in the file of that name beside it (of data; it has the stem of the case).
 Also: what --keys and --defaults print, and files that hold nothing or cannot be read."""
 
 import argparse
@@ -15,7 +17,7 @@ import subprocess
 import tempfile
 
 FAULTY = pathlib.Path(__file__).parent / "faulty"
-EXPECT = re.compile(rb"! expect: (\d+): (.*)\n")
+EXPECT = re.compile(rb"! expect(?: in (\S+))?: (\d+): (.*)\n")
 RANKS = 3
 # Every so many files one runs under mpirun, which takes far longer.
 STRIDE = 4
@@ -27,12 +29,12 @@ def check(condition, message):
         raise SystemExit(f"FAILED: {message}")
 
 
-def expected_lines(content):
-    """Pairs of line number and part of the message, from the first lines of the file."""
+def expected_lines(content, name):
+    """Place (file:line: ) and part of the message, from the first lines of the file of this name."""
     expected = []
     position = 0
     while match := EXPECT.match(content, position):
-        expected.append((int(match[1]), match[2].decode()))
+        expected.append((f"{match[1].decode() if match[1] else name}:{int(match[2])}: ", match[3].decode()))
         position = match.end()
     return expected
 
@@ -45,13 +47,15 @@ class Runner:
         self.mpiexec = given.mpiexec
         self.environment = dict(os.environ, OMPI_MCA_rmaps_base_oversubscribe="1")
 
-    def run(self, *options, case=None, ranks=0):
+    def run(self, *options, case=None, beside=None, ranks=0):
         """Exit code, standard output, standard error, after a look at what was written."""
         directory = pathlib.Path(tempfile.mkdtemp(prefix="sgimp_faulty_"))
         command = [self.sgimp, *options]
         if case is not None:
             (directory / case[0]).write_bytes(case[1])
             command.append(case[0])
+        if beside is not None:
+            shutil.copy(beside, directory)
         if ranks:
             command = [self.mpiexec, "-n", str(ranks), *command]
         before = sorted(directory.rglob("*"))
@@ -60,15 +64,18 @@ class Runner:
         shutil.rmtree(directory)
         return ended.returncode, ended.stdout.decode(), ended.stderr.decode(errors="replace")
 
-    def refuse(self, name, content, expected, ranks):
+    def refuse(self, name, content, expected, ranks, beside=None):
         """The case is refused with these messages and no others of the same kind."""
-        code, _, errors = self.run(case=(name, content), ranks=ranks)
+        code, _, errors = self.run(case=(name, content), beside=beside, ranks=ranks)
         where = f"{name} on {ranks or 'one'} ranks"
         check(code == 2, f"{where}: exit code {code}, not 2\n{errors}")
-        for line, message in expected:
-            found = [text for text in errors.splitlines() if text.startswith(f"{name}:{line}: ") and message in text]
-            check(len(found) == 1, f"{where}: {len(found)} times, not once: {line}: {message}\n{errors}")
-        reported = [text for text in errors.splitlines() if text.startswith(f"{name}:")]
+        # Files beside the case are named by their whole path.
+        files = {place.split(":")[0] for place, _ in expected} | {name}
+        told = [re.sub(r"^(?:sgimp: )?(?:/\S*/)?(?=[^/\s]+:\d)", "", text) for text in errors.splitlines()]
+        for place, message in expected:
+            found = [text for text in told if text.startswith(place) and message in text]
+            check(len(found) == 1, f"{where}: {len(found)} times, not once: {place}{message}\n{errors}")
+        reported = [text for text in told if any(text.startswith(f"{file}:") for file in files)]
         check(len(reported) == len(expected), f"{where}: {len(reported)} faults, not {len(expected)}:\n{errors}")
 
 
@@ -78,16 +85,19 @@ def check_files(runner):
     check(len(cases) >= 25, f"only {len(cases)} files in {FAULTY}")
     for number, path in enumerate(cases):
         content = path.read_bytes()
-        expected = expected_lines(content)
+        expected = expected_lines(content, path.name)
         check(expected, f"{path.name} has no line '! expect: <line>: <message>'")
-        runner.refuse(path.name, content, expected, RANKS if number % STRIDE == 0 else 0)
+        beside = path.with_suffix(".csv")
+        beside = beside if beside.exists() else None
+        runner.refuse(path.name, content, expected, RANKS if number % STRIDE == 0 else 0, beside)
 
 
 def check_no_case(runner):
     """Nothing in the file, no file, or a directory instead."""
     groups = ["case", "grid", "material", "body", "solver"]
+    missing = [("nothing.nml:1: ", f"&{group}: this group is missing") for group in groups]
     for ranks in (0, RANKS):
-        runner.refuse("nothing.nml", b"", [(1, f"&{group}: this group is missing") for group in groups], ranks)
+        runner.refuse("nothing.nml", b"", missing, ranks)
         for path in ("there_is_no_such_case.nml", "/"):
             code, _, errors = runner.run(path, ranks=ranks)
             said = [line for line in errors.splitlines() if line.startswith("sgimp: ")]
