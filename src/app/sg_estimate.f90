@@ -3,7 +3,7 @@ module sg_estimate
   use sg_collapse, only: open_files
   use sg_config, only: config_t
   use sg_errors, only: error_t
-  use sg_field_properties, only: points_of_materials
+  use sg_field_properties, only: points_of_materials, refuse_hidden
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
@@ -112,6 +112,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
 
     call fields%prepare(config, trim(one%acf), one%cov, points_of_materials(scene), error)
+    if (.not. allocated(error)) call refuse_hidden(fields%fields, error)
     if (.not. allocated(error)) call open_files(fields, config%monte_carlo%realizations, error)
   end subroutine prepare_fields
 

@@ -20,6 +20,14 @@ module sg_random_field
     integer, allocatable :: body(:)
   end type field_points_t
 
+  !> Laws of one coefficient of variation.
+  type :: kept_laws_t
+    real(wp) :: cov = 0.0_wp
+    real(wp), allocatable :: mean(:), sd(:)
+    integer, allocatable :: law(:)
+    type(marginal_t), allocatable :: laws(:)
+  end type kept_laws_t
+
   type :: random_field_t
     type(random_field_config_t) :: config
     type(correlation_t) :: correlation
@@ -35,9 +43,15 @@ module sg_random_field
     type(marginal_t), allocatable :: laws(:)
     !> Height at which depths begin, in m.
     real(wp) :: datum = 0.0_wp
+    !> Laws of other coefficients of variation than the present one, whose place there is empty:
+    !> members of a study go through all of them in turn.
+    type(kept_laws_t), allocatable, private :: kept(:)
+    integer, private :: present = 0
   contains
     procedure :: place
     procedure :: set_cov
+    procedure, private :: make_laws
+    procedure, private :: exchange_laws
     procedure :: moments_at
     procedure :: law_at
     procedure :: transform
@@ -88,12 +102,65 @@ contains
     class(random_field_t), intent(inout) :: this
     real(wp), intent(in) :: cov
     type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    if (cov > 0.0_wp) this%config%cov = [cov]
+    call find_place(cov, this%kept, k)
+    ! The present laws go to their place, those asked for come from theirs if they were there.
+    if (this%present > 0) call this%exchange_laws(this%present)
+    this%present = k
+    call this%exchange_laws(k)
+    if (.not. allocated(this%laws)) call this%make_laws(error)
+  end subroutine set_cov
+
+  !> Place `k` of a coefficient of variation among those that laws are kept of; a new one if it has
+  !> none.
+  subroutine find_place(cov, kept, k)
+    real(wp), intent(in) :: cov
+    type(kept_laws_t), allocatable, intent(inout) :: kept(:)
+    integer, intent(out) :: k
+    type(kept_laws_t), allocatable :: more(:)
+
+    if (.not. allocated(kept)) allocate (kept(0))
+    do k = 1, size(kept)
+      if (.not. abs(kept(k)%cov - cov) > 0.0_wp) return
+    end do
+    allocate (more(size(kept) + 1))
+    more(:size(kept)) = kept
+    more(k)%cov = cov
+    call move_alloc(more, kept)
+  end subroutine find_place
+
+  !> Exchanges the present laws with those in place k, of which either may be none.
+  subroutine exchange_laws(this, k)
+    class(random_field_t), intent(inout) :: this
+    integer, intent(in) :: k
+    type(kept_laws_t) :: here
+
+    call move_alloc(this%mean, here%mean)
+    call move_alloc(this%sd, here%sd)
+    call move_alloc(this%law, here%law)
+    call move_alloc(this%laws, here%laws)
+    associate (other => this%kept(k))
+      call move_alloc(other%mean, this%mean)
+      call move_alloc(other%sd, this%sd)
+      call move_alloc(other%law, this%law)
+      call move_alloc(other%laws, this%laws)
+      call move_alloc(here%mean, other%mean)
+      call move_alloc(here%sd, other%sd)
+      call move_alloc(here%law, other%law)
+      call move_alloc(here%laws, other%laws)
+    end associate
+  end subroutine exchange_laws
+
+  !> Moments at all points and the laws that they make.
+  subroutine make_laws(this, error)
+    class(random_field_t), intent(inout) :: this
+    type(error_t), allocatable, intent(out) :: error
     integer, allocatable :: first(:)
     integer :: i, k
 
-    if (cov > 0.0_wp) this%config%cov = [cov]
-    if (.not. allocated(this%mean)) allocate (this%mean(size(this%x)), this%sd(size(this%x)), &
-      this%law(size(this%x)))
+    allocate (this%mean(size(this%x)), this%sd(size(this%x)), this%law(size(this%x)))
     allocate (first(0))
     do i = 1, size(this%x)
       call this%moments_at(this%y(i), this%mean(i), this%sd(i))
@@ -113,13 +180,12 @@ contains
       if (k > size(first)) first = [first, i]
       this%law(i) = k
     end do
-    if (allocated(this%laws)) deallocate (this%laws)
     allocate (this%laws(size(first)))
     do k = 1, size(first)
       call init_law(this, this%mean(first(k)), this%sd(first(k)), this%laws(k), error)
       if (allocated(error)) return
     end do
-  end subroutine set_cov
+  end subroutine make_laws
 
   subroutine init_law(this, mean, sd, law, error)
     class(random_field_t), intent(in) :: this

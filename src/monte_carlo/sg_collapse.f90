@@ -3,7 +3,8 @@
 module sg_collapse
   use sg_config, only: config_t
   use sg_errors, only: error_t
-  use sg_field_properties, only: compose_properties, points_of_materials, units_of
+  use sg_field_properties, only: compose_properties, points_of_materials, refuse_hidden, &
+    units_of
   use sg_field_record, only: field_file_t, field_record_t, made_by_t
   use sg_kinds, only: i8, wp
   use sg_materials, only: MODEL_MOHR_COULOMB
@@ -82,6 +83,7 @@ contains
     do k = 1, size(this%fields)
       call this%fields(k)%prepare(config, trim(config%study%acf(k)), config%study%cov(1), &
         this%points, error)
+      if (.not. allocated(error)) call refuse_hidden(this%fields(k)%fields, error)
       ! What is wrong with one of the laws is told now, and not by members that fail.
       do j = size(config%study%cov), 1, -1
         if (.not. allocated(error)) call this%fields(k)%set_cov(config%study%cov(j), error)

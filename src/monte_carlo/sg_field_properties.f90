@@ -2,6 +2,7 @@
 !> they get.
 module sg_field_properties
   use sg_config, only: config_t, nominal_value
+  use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_kinds, only: wp
   use sg_property, only: property_index, PROPERTY_FRICTION_ANGLE, PROPERTY_UNITS
   use sg_random_field, only: field_points_t, random_field_t
@@ -11,7 +12,7 @@ module sg_field_properties
   implicit none
   private
 
-  public :: points_of_materials, compose_properties, units_of
+  public :: points_of_materials, compose_properties, refuse_hidden, units_of
 
 contains
 
@@ -54,8 +55,7 @@ contains
     used = 0
     do k = 1, size(fields)
       material = fields(k)%config%material_index
-      property = property_index(trim(fields(k)%config%property))
-      if (property == 0) property = PROPERTY_FRICTION_ANGLE ! by its tangent
+      property = property_made_by(fields(k))
       do found = 1, used
         if (list(found)%property == property .and. list(found)%material == material) exit
       end do
@@ -76,6 +76,39 @@ contains
     end do
     properties = list(:used)
   end subroutine compose_properties
+
+  !> The property that a field becomes; its tangent is a friction angle, too.
+  pure integer function property_made_by(field) result(property)
+    type(random_field_t), intent(in) :: field
+
+    property = property_index(trim(field%config%property))
+    if (property == 0) property = PROPERTY_FRICTION_ANGLE
+  end function property_made_by
+
+  !> A field that counts nowhere, as later ones of its property cover all its points, is bad input.
+  subroutine refuse_hidden(fields, error)
+    type(random_field_t), intent(in) :: fields(:)
+    type(error_t), allocatable, intent(out) :: error
+    logical, allocatable :: counts(:)
+    integer :: k, l
+
+    do k = 1, size(fields)
+      allocate (counts(maxval(fields(k)%points)), source=.false.)
+      counts(fields(k)%points) = .true.
+      do l = k + 1, size(fields)
+        if (fields(l)%config%material_index /= fields(k)%config%material_index) cycle
+        if (property_made_by(fields(l)) /= property_made_by(fields(k))) cycle
+        counts(pack(fields(l)%points, fields(l)%points <= size(counts))) = .false.
+      end do
+      if (.not. any(counts)) then
+        call raise(error, EXIT_BAD_INPUT, 'random field '//trim(fields(k)%config%name)// &
+          ' counts nowhere: later fields of the same property cover all its points', &
+          'refuse_hidden')
+        return
+      end if
+      deallocate (counts)
+    end do
+  end subroutine refuse_hidden
 
   !> Unit of the values of a field of this property.
   pure function units_of(property) result(units)

@@ -144,6 +144,11 @@ def check_refusals(program, scratch):
     text = f"{head}{FRICTION}, acf='snx', {ISOTROPIC}, data='friction.csv' /\n&monte_carlo realizations=2 /\n"
     (scratch / "case.nml").write_text(text)
     data.write_text(MEASURED)
+    hidden = (
+        f"&random_field property='tan_friction_angle', material='sand', mean=0.6, cov=0.1, acf='snx', {ISOTROPIC} /"
+    )
+    (scratch / "hidden.nml").write_text(text + hidden + "\n")
+    refuse([program, "hidden.nml", "--check"], scratch, "friction_angle counts nowhere")
     call([program, "case.nml"], scratch)
     data.write_text(MEASURED.replace("27.5", "28.5"))
     (scratch / "more.nml").write_text(text.replace("realizations=2", "realizations=4"))
