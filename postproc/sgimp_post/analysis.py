@@ -11,6 +11,7 @@ from .ensemble import RUNOUTS, STATUS_TEXTS
 from .fits import best_fit, fit_laws, rivals
 from .statistics import (
     describe,
+    describe_pairs,
     finite,
     holm,
     outlier_probability,
@@ -99,6 +100,7 @@ def _case(case, primary: str, floor: dict) -> dict:
         "failed_share": asdict(wilson(int((~ok).sum()), case.count)),
         "unsettled": int((case.column("settled")[ok] == 0).sum()),
         "wall_touched": int((case.column("wall_touched")[ok] == 1).sum()),
+        "pairs_of_members": asdict(describe_pairs(case.id[ok], case.column(primary)[ok])),
         "runouts": {name: asdict(describe(case.values(name))) for name in RUNOUTS},
         "height_wall": asdict(describe(case.values("height_wall"))),
         "exceedance": asdict(probability_above(values, deterministic)),

@@ -143,6 +143,15 @@ def warnings(summary: dict) -> list:
             " independent, and the intervals and p values here, which take them to be, do not hold"
             " for means and exceedance (mostly they are too wide)."
         )
+    if summary["sampling"] == "antithetic":
+        means = [
+            f"{case['label']} {pair['mean']:.3f} m ({pair['mean_low']:.3f} to"
+            f" {pair['mean_high']:.3f} m, {pair['n']} pairs)"
+            for case in summary["cases"]
+            if (pair := case["pairs_of_members"])["n"] > 1
+        ]
+        if means:
+            found.append("Means with the interval of their mirrored pairs: " + "; ".join(means))
     if totals["unsettled"]:
         found.append(
             f"{totals['unsettled']} members were still moving at end_time;"

@@ -83,6 +83,14 @@ def finite(values) -> np.ndarray:
     return values[np.isfinite(values)]
 
 
+def describe_pairs(ids, values, confidence: float = CONFIDENCE) -> Description:
+    """The mean of antithetic members with its interval: of the means of the pairs (1, 2), (3, 4)
+    and so on that are whole and finite, which are independent where their members are not."""
+    known = {int(i): float(v) for i, v in zip(ids, values) if np.isfinite(v)}
+    pairs = [0.5 * (v + known[i + 1]) for i, v in known.items() if i % 2 == 1 and i + 1 in known]
+    return describe(pairs, confidence)
+
+
 def describe(values, confidence: float = CONFIDENCE) -> Description:
     x = finite(values)
     n = len(x)

@@ -8,6 +8,7 @@ from synthetic import sample, write_ensemble
 from sgimp_post.ensemble import read_ensemble
 from sgimp_post.statistics import (
     describe,
+    describe_pairs,
     exceedance,
     holm,
     paired_difference,
@@ -142,3 +143,30 @@ def test_members_stand_in_the_order_of_their_ids(tmp_path):
     (got,) = read_ensemble(write_ensemble(tmp_path, [case])).cases
     assert list(got.id) == [1, 2, 3, 4] and list(got.failed) == [False, False, False, True]
     assert got.values("runout_max") == pytest.approx(values[[1, 3, 0]])
+
+
+def test_pairs_of_antithetic_members():
+    """Mirror images leave only the even part: means of pairs and their interval by hand."""
+    ids = np.array([1, 2, 3, 4, 5, 7, 8, 9, 10])
+    values = np.array([1.0, 3.0, 2.0, 4.0, 9.0, np.nan, 5.0, 0.0, 8.0])
+    found = describe_pairs(ids, values)
+    assert found.n == 3  # (1, 2), (3, 4), (9, 10)
+    assert found.mean == pytest.approx(3.0)
+    half = stats.t.ppf(0.975, 2) * 1.0 / np.sqrt(3)  # pairs 2, 3, 4: deviation 1
+    assert found.mean_high - found.mean == pytest.approx(half)
+
+
+def test_intervals_of_pairs_hold_where_those_of_members_do_not():
+    """Pairs z, -z of |z| + z/5: 40 members are 20 values twice, their interval is too narrow by
+    sqrt(2) and holds the mean in 83 % of 1000 cases; that of pairs in 95 %, less four standard
+    errors (0.0276)."""
+    rng = np.random.default_rng(5)
+    ids, mean, inside = np.arange(1, 41), np.sqrt(2.0 / np.pi), {"pairs": 0, "members": 0}
+    for _ in range(1000):
+        z = rng.standard_normal(20)
+        values = np.empty(40)
+        values[::2], values[1::2] = np.abs(z) + 0.2 * z, np.abs(z) - 0.2 * z
+        for name, found in (("pairs", describe_pairs(ids, values)), ("members", describe(values))):
+            inside[name] += bool(found.mean_low <= mean <= found.mean_high)
+    assert inside["pairs"] > 922
+    assert inside["members"] < 900
