@@ -102,6 +102,8 @@ contains
       if (allocated(error)) return
     end do
     call fields%estimate(bytes, description, error)
+    if (allocated(error) .or. size(config%study%acf) == 1) return
+    description = description//' (for each of '//to_text(size(config%study%acf))//' functions)'
   end subroutine describe_field
 
   subroutine prepare_fields(config, scene, one, fields, error)

@@ -315,7 +315,7 @@ contains
     class(random_fields_t), intent(in) :: this
     integer, intent(in) :: k, l
 
-    same = this%sampler_of(l) > 0 .and. this%methods(k) == this%methods(l)
+    same = this%fields(l)%config%file == '' .and. this%methods(k) == this%methods(l)
     associate (a => this%fields(k)%correlation, b => this%fields(l)%correlation)
       same = same .and. a%acf%name == b%acf%name .and. (a%is_radial .eqv. b%is_radial)
       same = same .and. all(abs([a%scale - b%scale, a%cell - b%cell, a%rotation - b%rotation, &
@@ -412,7 +412,7 @@ contains
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: one
     integer(i8) :: more
-    integer :: k
+    integer :: k, l
 
     bytes = 0
     description = ''
@@ -423,7 +423,11 @@ contains
           call estimate_sampler_memory(trim(this%methods(k)), field%correlation, field%x, field%y, &
             more, one, error)
           if (allocated(error)) return
-          bytes = bytes + more
+          if (any([(this%same_sampler(k, l), l=1, k - 1)])) then
+            one = one//', shared with a field before'
+          else
+            bytes = bytes + more
+          end if
         end if
         if (k > 1) description = description//new_line('a')//'                '
         if (size(this%fields) > 1) description = description//trim(field%config%name)//': '
