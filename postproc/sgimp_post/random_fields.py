@@ -397,6 +397,9 @@ def _read_spec(path, root, index, keys) -> FieldSpec:
     n = len(column["x"])
     for key in ("width", "height"):
         column[key] = group[key][...].astype(float).reshape(-1) if key in group else np.zeros(n)
+    for key, values in column.items():  # what is the same at all points is written once
+        if len(values) == 1:
+            column[key] = np.broadcast_to(values, n).copy()
     if {len(values) for values in column.values()} != {n} or n == 0:
         raise PostError(f"{path}: /random_fields/{name}: columns of different lengths, or empty")
     records = {}

@@ -59,7 +59,8 @@ def write_run(directory, groups, points, *, members=20, values=None, records=Non
             spacing = keys.get("spacing", 0.25)
             columns = {"x": x, "y": y, "width": spacing, "height": spacing, "mean": mean, "sd": sd}
             for name, column in columns.items():
-                group[name] = np.broadcast_to(column, x.shape)
+                column = np.broadcast_to(column, x.shape)
+                group[name] = column[:1] if np.ptp(column) == 0.0 and name not in "xy" else column
             for acf in acfs:
                 made_by = group.create_group(acf)
                 made_by.attrs["method"] = records[k - 1]["method"]

@@ -477,8 +477,9 @@ def test_data_are_read_by_the_law_at_their_depth(tmp_path, spread):
     depth = 1.5 - y
     with h5py.File(tmp_path / "ensemble.h5", "r+") as file:
         group = file["random_fields/phi"]
-        group["mean"][...] = MEAN + 4.0 * depth
-        group["sd"][...] = 3.0 + 0.4 * depth if "sd" in spread else 0.1 * (MEAN + 4.0 * depth)
+        del group["mean"], group["sd"]
+        group["mean"] = MEAN + 4.0 * depth
+        group["sd"] = 3.0 + 0.4 * depth if "sd" in spread else 0.1 * (MEAN + 4.0 * depth)
     fields = read_random_fields(tmp_path)
     values = fields.values(fields.cases[0], np.array([1, 2, 3]))["phi"]
     assert values[:, 8 + 3] == pytest.approx(47.0, rel=1e-12)

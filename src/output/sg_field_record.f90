@@ -84,10 +84,10 @@ contains
         call file%set(group, 'units', r%units)
         call file%write(group//'/x', r%x, 'm')
         call file%write(group//'/y', r%y, 'm')
-        call file%write(group//'/width', r%width, 'm')
-        call file%write(group//'/height', r%height, 'm')
-        call file%write(group//'/mean', r%mean, r%units)
-        call file%write(group//'/sd', r%sd, r%units)
+        call file%write(group//'/width', once(r%width), 'm')
+        call file%write(group//'/height', once(r%height), 'm')
+        call file%write(group//'/mean', once(r%mean), r%units)
+        call file%write(group//'/sd', once(r%sd), r%units)
         if (size(r%data, 2) > 0) then
           call file%make_group(group//'/data')
           call file%write(group//'/data/x', r%data(1, :), 'm')
@@ -106,6 +106,15 @@ contains
       end associate
     end do
   end subroutine write_field_records
+
+  !> What is the same at all points, [1]; else the values, [points].
+  pure function once(values) result(short)
+    real(wp), intent(in) :: values(:)
+    real(wp), allocatable :: short(:)
+
+    short = values
+    if (all(abs(values - values(1)) <= 0.0_wp)) short = values(:1)
+  end function once
 
   !> A file of fields: /points/<name>/{x, y} and /cases/<label>/{id, <name>}, <name> being [points,
   !> realizations] as in Fortran.
