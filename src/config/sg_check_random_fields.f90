@@ -33,6 +33,7 @@ contains
       call check_material(desk, k)
       call check_moments(desk, k)
       call check_bounds(desk, k)
+      call check_trend(desk, k)
       call check_law(desk, k)
       call check_correlation(desk, k)
     end do
@@ -225,8 +226,9 @@ contains
           'allowed: cov, or sd, the standard deviation)')
       end if
       if (size(field%cov) == 0) return
-      if (desk%good(GROUP, k, 'mean') .and. .not. abs(field%mean) > 0.0_wp) call desk%fault(GROUP, &
-        k, 'cov', 'of a mean of 0 makes no standard deviation (allowed: sd instead of cov)')
+      if (desk%good(GROUP, k, 'mean mean_gradient') .and. .not. has_trend(field) .and. &
+        .not. abs(field%mean) > 0.0_wp) call desk%fault(GROUP, k, 'cov', 'of a mean of 0 makes '// &
+        'no standard deviation (allowed: sd instead of cov)')
       if (abs(field%sd_gradient) > 0.0_wp) call desk%fault(GROUP, k, 'sd_gradient', 'with cov, '// &
         'the standard deviation follows the mean (allowed: sd and sd_gradient)')
     end associate
@@ -254,7 +256,7 @@ contains
         if (.not. lower < upper) then
           call desk%fault(GROUP, k, 'upper', to_text(upper)//' is not above lower = '// &
             to_text(lower))
-        else if (field%distribution /= 'truncated_normal') then
+        else if (field%distribution /= 'truncated_normal' .and. .not. has_trend(field)) then
           if (.not. lower < field%mean) call desk%fault(GROUP, k, 'lower', &
             to_text(lower)//' is not below mean = '//to_text(field%mean))
           if (.not. field%mean < upper) call desk%fault(GROUP, k, 'upper', &
@@ -275,6 +277,86 @@ contains
     end associate
   end subroutine check_bounds
 
+  pure logical function has_trend(field)
+    type(random_field_config_t), intent(in) :: field
+
+    has_trend = abs(field%mean_gradient) > 0.0_wp
+  end function has_trend
+
+  !> Mean and standard deviation stay what they must be down to the lowest place and up to the
+  !> highest. Points lie between, so that a mean may vanish at the surface.
+  subroutine check_trend(desk, k)
+    type(desk_t), intent(inout) :: desk
+    integer, intent(in) :: k
+    real(wp) :: heights(2), datum, mean, sd
+    integer :: i
+
+    associate (field => desk%config%random_fields(k))
+      if (.not. desk%good(GROUP, k, 'mean mean_gradient sd_gradient distribution')) return
+      if (.not. (abs(field%mean_gradient) > 0.0_wp .or. abs(field%sd_gradient) > 0.0_wp)) return
+      call find_heights(desk, k, heights)
+      if (.not. heights(1) < heights(2)) return
+      datum = heights(2)
+      if (size(field%datum) > 0) datum = field%datum(1)
+      do i = 1, 2
+        mean = field%mean + field%mean_gradient*(datum - heights(i))
+        if (field%distribution /= 'truncated_normal' .and. .not. (mean >= field%bounds(1) .and. &
+          mean <= field%bounds(2))) then
+          call desk%fault(GROUP, k, 'mean_gradient', 'at y = '//to_text(heights(i))// &
+            ' the mean is '//to_text(mean, 4)//', not between lower = '// &
+            to_text(field%bounds(1), 4)//' and upper = '//to_text(field%bounds(2), 4))
+          exit
+        end if
+        if (size(field%sd) == 0) cycle
+        sd = field%sd(1) + field%sd_gradient*(datum - heights(i))
+        if (.not. sd > 0.0_wp) then
+          call desk%fault(GROUP, k, 'sd_gradient', 'at y = '//to_text(heights(i))// &
+            ' the standard deviation is '//to_text(sd, 4)//' (allowed: more than 0)')
+          exit
+        end if
+      end do
+    end associate
+  end subroutine check_trend
+
+  !> Lowest and highest place that a field reaches; the same twice where that is not known from the
+  !> case file alone.
+  subroutine find_heights(desk, k, heights)
+    type(desk_t), intent(in) :: desk
+    integer, intent(in) :: k
+    real(wp), intent(out) :: heights(2)
+    integer :: i
+
+    heights = [huge(1.0_wp), -huge(1.0_wp)]
+    associate (field => desk%config%random_fields(k))
+      do i = 1, size(desk%config%bodies)
+        associate (body => desk%config%bodies(i))
+          if (body%material_index /= field%material_index .or. field%material_index == 0) cycle
+          if (field%body_index > 0 .and. field%body_index /= i) cycle
+          select case (body%shape)
+          case ('rectangle')
+            if (.not. desk%good('body', i, 'y height')) exit
+            heights = [min(heights(1), body%y), max(heights(2), body%y + body%height)]
+          case ('disc')
+            if (.not. desk%good('body', i, 'y radius')) exit
+            heights = [min(heights(1), body%y - body%radius), max(heights(2), body%y + body%radius)]
+          case ('polygon')
+            if (.not. desk%good('body', i, 'vertices') .or. size(body%vertices) < 6) exit
+            heights = [min(heights(1), minval(body%vertices(2::2))), &
+              max(heights(2), maxval(body%vertices(2::2)))]
+          case default
+            exit
+          end select
+        end associate
+      end do
+      if (i <= size(desk%config%bodies)) then
+        heights = 0.0_wp
+      else if (size(field%region) > 1) then
+        heights = [max(heights(1), minval(field%region(2::2))), &
+          min(heights(2), maxval(field%region(2::2)))]
+      end if
+    end associate
+  end subroutine find_heights
+
   !> The distribution exists with these moments and ends.
   subroutine check_law(desk, k)
     type(desk_t), intent(inout) :: desk
@@ -287,8 +369,9 @@ contains
       associate (lower => field%bounds(1), upper => field%bounds(2), mean => field%mean)
         select case (field%distribution)
         case ('lognormal', 'gamma', 'weibull')
-          if (.not. mean > 0.0_wp) call desk%fault(GROUP, k, 'mean', to_text(mean)//' is no '// &
-            'mean of a '//trim(field%distribution)//' distribution (allowed: more than 0)')
+          if (mean > 0.0_wp .or. has_trend(field)) return
+          call desk%fault(GROUP, k, 'mean', to_text(mean)//' is no mean of a '// &
+            trim(field%distribution)//' distribution (allowed: more than 0)')
         case ('beta')
           if (upper >= huge(upper)) then
             call desk%fault(GROUP, k, 'upper', 'a beta distribution needs both ends, lower and '// &
