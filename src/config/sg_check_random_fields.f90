@@ -288,7 +288,7 @@ contains
   subroutine check_trend(desk, k)
     type(desk_t), intent(inout) :: desk
     integer, intent(in) :: k
-    real(wp) :: heights(2), datum, mean, sd
+    real(wp) :: heights(2), datum, least, mean, sd
     integer :: i
 
     associate (field => desk%config%random_fields(k))
@@ -298,13 +298,15 @@ contains
       if (.not. heights(1) < heights(2)) return
       datum = heights(2)
       if (size(field%datum) > 0) datum = field%datum(1)
+      least = field%bounds(1)
+      if (has_word('lognormal gamma weibull', field%distribution)) least = max(least, 0.0_wp)
       do i = 1, 2
         mean = field%mean + field%mean_gradient*(datum - heights(i))
-        if (field%distribution /= 'truncated_normal' .and. .not. (mean >= field%bounds(1) .and. &
+        if (field%distribution /= 'truncated_normal' .and. .not. (mean >= least .and. &
           mean <= field%bounds(2))) then
           call desk%fault(GROUP, k, 'mean_gradient', 'at y = '//to_text(heights(i))// &
-            ' the mean is '//to_text(mean, 4)//', not between lower = '// &
-            to_text(field%bounds(1), 4)//' and upper = '//to_text(field%bounds(2), 4))
+            ' the mean is '//to_text(mean, 4)//' (allowed: '//to_text(least, 4)//' to '// &
+            upper_text(field%bounds(2))//')')
           exit
         end if
         if (size(field%sd) == 0) cycle
@@ -317,6 +319,14 @@ contains
       end do
     end associate
   end subroutine check_trend
+
+  pure function upper_text(upper) result(text)
+    real(wp), intent(in) :: upper
+    character(len=:), allocatable :: text
+
+    text = to_text(upper, 4)
+    if (upper >= huge(upper)) text = 'any'
+  end function upper_text
 
   !> Lowest and highest place that a field reaches; the same twice where that is not known from the
   !> case file alone.
