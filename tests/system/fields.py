@@ -47,7 +47,8 @@ CASES = {
     "circulant": (COLUMN, f"{FRICTION}, acf='csx', {BEDDED}, method='circulant' /\n&monte_carlo realizations=4 /"),
     "circulant_rotated": (
         COLUMN,
-        f"{FRICTION}, acf='snx', {BEDDED}, rotation=30, distribution='gamma', method='circulant' /\n"
+        f"{FRICTION}, acf='snx', {BEDDED}, rotation=30, distribution='gamma', method='circulant', "
+        "data='friction.csv' /\n"
         "&monte_carlo realizations=4, sampling='latin_hypercube' /",
     ),
     "averages": (
