@@ -1,14 +1,14 @@
 !> What a run would take, without writing anything: `--check`.
 module sg_estimate
-  use sg_collapse, only: open_files
+  use sg_collapse, only: prepare_fields
   use sg_config, only: config_t
   use sg_errors, only: error_t
-  use sg_field_properties, only: points_of_materials, refuse_hidden
+  use sg_field_properties, only: points_of_materials
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: COLUMN_COUNT, outcome_t, reset_outcome, SECONDS, STEPS
-  use sg_plan, only: plan_t, study_case_t
+  use sg_plan, only: plan_t
   use sg_random_fields, only: random_fields_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
@@ -40,7 +40,7 @@ contains
 
     call build_scene(config, scene, error)
     if (allocated(error)) return
-    call describe_field(config, plan, scene, field, error)
+    call describe_field(config, scene, field, error)
     if (allocated(error)) return
     cells_x = nint((config%grid%x_max - config%grid%x_min)/config%grid%cell_size)
     cells_y = nint((config%grid%y_max - config%grid%y_min)/config%grid%cell_size)
@@ -83,40 +83,22 @@ contains
     with_break = new_line('a')//text
   end function line
 
-  subroutine describe_field(config, plan, scene, description, error)
+  subroutine describe_field(config, scene, description, error)
     type(config_t), intent(in) :: config
-    type(plan_t), intent(in) :: plan
     type(scene_t), intent(in) :: scene
     character(len=:), allocatable, intent(out) :: description
     type(error_t), allocatable, intent(out) :: error
-    type(random_fields_t) :: fields
+    type(random_fields_t), allocatable :: fields(:)
     integer(i8) :: bytes
-    integer :: k
 
     description = 'none: the run is deterministic'
     if (.not. config%has_random_field) return
-    ! Every case, for what may be wrong with some of them only.
-    do k = 1, size(plan%cases)
-      if (plan%cases(k)%is_homogeneous) cycle
-      call prepare_fields(config, scene, plan%cases(k), fields, error)
-      if (allocated(error)) return
-    end do
-    call fields%estimate(bytes, description, error)
-    if (allocated(error) .or. size(config%study%acf) == 1) return
-    description = description//' (for each of '//to_text(size(config%study%acf))//' functions)'
+    call prepare_fields(config, points_of_materials(scene), fields, error)
+    if (allocated(error)) return
+    call fields(size(fields))%estimate(bytes, description, error)
+    if (allocated(error) .or. size(fields) == 1) return
+    description = description//' (for each of '//to_text(size(fields))//' functions)'
   end subroutine describe_field
-
-  subroutine prepare_fields(config, scene, one, fields, error)
-    type(config_t), intent(in) :: config
-    type(scene_t), intent(in) :: scene
-    type(study_case_t), intent(in) :: one
-    type(random_fields_t), intent(out) :: fields
-    type(error_t), allocatable, intent(out) :: error
-
-    call fields%prepare(config, trim(one%acf), one%cov, points_of_materials(scene), error)
-    if (.not. allocated(error)) call refuse_hidden(fields%fields, error)
-    if (.not. allocated(error)) call open_files(fields, config%monte_carlo%realizations, error)
-  end subroutine prepare_fields
 
   !> Seconds of one step, from the first steps of the homogeneous member.
   function time_step_cost(config, scene) result(step_seconds)

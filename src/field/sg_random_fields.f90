@@ -24,7 +24,7 @@ module sg_random_fields
   implicit none
   private
 
-  public :: field_values_t, follows_study, random_fields_t
+  public :: field_values_t, follows_study, random_fields_t, refuse_changed_files
 
   !> The values of one field in one realization.
   type :: field_values_t
@@ -187,10 +187,6 @@ contains
     call this%data%init()
     do k = 1, size(this%fields)
       associate (field => config%random_fields(k))
-        call refuse_changed(field%data, field%data_content, 'data_content', error)
-        if (.not. allocated(error)) call refuse_changed(field%file, field%file_content, &
-          'file_content', error)
-        if (allocated(error)) return
         if (field%data /= '') call this%data%add(field%data, k, error)
         if (allocated(error)) return
       end associate
@@ -206,7 +202,22 @@ contains
     end do
   end subroutine load_data
 
-  !> A file that is not what the case file says it was.
+  !> Files of measurements and fields that are not what the case file says they were.
+  subroutine refuse_changed_files(config, error)
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(out) :: error
+    integer :: k
+
+    do k = 1, size(config%random_fields)
+      associate (field => config%random_fields(k))
+        call refuse_changed(field%data, field%data_content, 'data_content', error)
+        if (.not. allocated(error)) call refuse_changed(field%file, field%file_content, &
+          'file_content', error)
+        if (allocated(error)) return
+      end associate
+    end do
+  end subroutine refuse_changed_files
+
   subroutine refuse_changed(path, content, key, error)
     character(len=*), intent(in) :: path, content, key
     type(error_t), allocatable, intent(out) :: error
@@ -248,10 +259,9 @@ contains
     integer :: k
 
     if (.not. abs(this%cov - cov) > 0.0_wp) return
-    do k = 1, size(this%fields)
-      if (k > 1 .and. this%cov >= 0.0_wp) exit
-      if (k == 1) call this%fields(k)%set_cov(cov, error)
-      if (k > 1) call this%fields(k)%set_cov(0.0_wp, error)
+    ! The laws of the other fields are made once.
+    do k = 1, merge(size(this%fields), 1, this%cov < 0.0_wp)
+      call this%fields(k)%set_cov(merge(cov, 0.0_wp, k == 1), error)
       if (allocated(error)) return
     end do
     this%cov = cov

@@ -21,7 +21,8 @@ module sg_collapse
   use sg_plan, only: plan_t
   use sg_property, only: PROPERTY_FRICTION_ANGLE
   use sg_random_field, only: field_points_t
-  use sg_random_fields, only: field_values_t, follows_study, random_fields_t
+  use sg_random_fields, only: field_values_t, follows_study, random_fields_t, &
+    refuse_changed_files
   use sg_recorder, only: recorder_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
@@ -30,7 +31,7 @@ module sg_collapse
   implicit none
   private
 
-  public :: collapse_model_t, open_files
+  public :: collapse_model_t, prepare_fields
 
   !> Homogeneous members beyond the first: CFL number within +-20 %, lines of the grid shifted by up
   !> to a cell at the toe, properties within 1e-6. None of it means anything physically; the spread
@@ -56,6 +57,7 @@ module sg_collapse
     procedure :: field_method
     procedure :: field_records
     procedure :: make_fields
+    procedure, private :: choose_fields
     procedure, private :: vary_homogeneous
     procedure, private :: vary_by_field
     procedure, private :: is_recorded
@@ -71,7 +73,7 @@ contains
     type(config_t), intent(in) :: config
     type(plan_t), intent(in) :: plan
     type(error_t), allocatable, intent(out) :: error
-    integer :: j, k
+    integer :: k
 
     this%config = config
     this%plan = plan
@@ -79,21 +81,37 @@ contains
     if (allocated(error)) return
     if (.not. config%has_random_field) return
     this%points = points_of_materials(this%scene)
-    allocate (this%fields(size(config%study%acf)))
-    do k = 1, size(this%fields)
-      call this%fields(k)%prepare(config, trim(config%study%acf(k)), config%study%cov(1), &
-        this%points, error)
-      if (.not. allocated(error)) call refuse_hidden(this%fields(k)%fields, error)
-      ! What is wrong with one of the laws is told now, and not by members that fail.
-      do j = size(config%study%cov), 1, -1
-        if (.not. allocated(error)) call this%fields(k)%set_cov(config%study%cov(j), error)
-      end do
-      if (.not. allocated(error)) call open_files(this%fields(k), &
-        config%monte_carlo%realizations, error)
-      if (.not. allocated(error)) call this%fields(k)%build(error)
+    call prepare_fields(config, this%points, this%fields, error)
+    do k = 1, size(config%study%acf)
       if (allocated(error)) return
+      call this%fields(k)%build(error)
     end do
   end subroutine init_collapse
+
+  !> The fields for each ACF of the study, without their factors; what is wrong with them in any
+  !> case is told here, and not by members that fail.
+  subroutine prepare_fields(config, points, fields, error)
+    type(config_t), intent(in) :: config
+    !> Of each material.
+    type(field_points_t), intent(in) :: points(:)
+    type(random_fields_t), allocatable, intent(out) :: fields(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: j, k
+
+    call refuse_changed_files(config, error)
+    if (allocated(error)) return
+    allocate (fields(size(config%study%acf)))
+    do k = 1, size(fields)
+      call fields(k)%prepare(config, trim(config%study%acf(k)), config%study%cov(1), points, error)
+      if (.not. allocated(error)) call refuse_hidden(fields(k)%fields, error)
+      do j = size(config%study%cov), 1, -1
+        if (.not. allocated(error)) call fields(k)%set_cov(config%study%cov(j), error)
+      end do
+      if (.not. allocated(error)) call open_files(fields(k), config%monte_carlo%realizations, &
+        error)
+      if (allocated(error)) return
+    end do
+  end subroutine prepare_fields
 
   !> How the fields are sampled, with what was conceded for each ACF; empty without a field.
   function field_method(this) result(text)
@@ -328,11 +346,11 @@ contains
     type(variation_t), intent(inout) :: variation
     type(field_values_t), allocatable, intent(out) :: values(:)
     type(error_t), allocatable, intent(out) :: error
-    type(field_values_t), allocatable :: block(:, :)
+    integer :: k
 
-    call this%make_fields(case_index, id, 1, block, error)
+    call this%choose_fields(case_index, k, error)
+    if (.not. allocated(error)) call this%fields(k)%realize(id, values, error)
     if (allocated(error)) return
-    values = block(:, 1)
     call compose_properties(this%config, this%fields(1)%fields, values, this%points, &
       variation%properties)
   end subroutine vary_by_field
@@ -346,15 +364,24 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k
 
+    call this%choose_fields(case_index, k, error)
+    if (.not. allocated(error)) call this%fields(k)%realize_block(first, count, values, error)
+  end subroutine make_fields
+
+  !> The fields of a study case, in place `k`, with the laws of its coefficient of variation.
+  subroutine choose_fields(this, case_index, k, error)
+    class(collapse_model_t), intent(inout) :: this
+    integer, intent(in) :: case_index
+    integer, intent(out) :: k
+    type(error_t), allocatable, intent(out) :: error
+
     associate (one => this%plan%cases(case_index))
       do k = 1, size(this%fields)
         if (this%config%study%acf(k) == one%acf) exit
       end do
       call this%fields(k)%set_cov(one%cov, error)
-      if (.not. allocated(error)) call this%fields(k)%realize_block(first, &
-        count, values, error)
     end associate
-  end subroutine make_fields
+  end subroutine choose_fields
 
   !> Members that were asked for; without a random field the nominal run, if anything is to be
   !> recorded at all.
