@@ -65,13 +65,13 @@ def permuted(i: int, n: int, order) -> np.ndarray:
     )
     keys += tuple((key + np.uint64(0x9E3779B9)) & low for key in keys[:2])
     place = np.full(len(order), i, dtype=np.uint64)
-    todo = np.arange(len(order))
-    while len(todo):
-        left, right = place[todo] >> shift, place[todo] & mask
+    beyond = np.arange(len(order))
+    while len(beyond):
+        left, right = place[beyond] >> shift, place[beyond] & mask
         for key in keys:
-            left, right = right, left ^ (_mixed(right, key[todo]) & mask)
-        place[todo] = (left << shift) | right
-        todo = todo[place[todo] >= n]
+            left, right = right, left ^ (_mixed(right, key[beyond]) & mask)
+        place[beyond] = (left << shift) | right
+        beyond = beyond[place[beyond] >= n]
     return place
 
 

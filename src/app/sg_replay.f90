@@ -9,7 +9,7 @@ module sg_replay
   use sg_outcome, only: COLUMN_COUNT, COLUMNS, outcome_t, status_text
   use sg_plan, only: plan_t
   use sg_snapshot, only: snapshot_name
-  use sg_text, only: to_text
+  use sg_text, only: joined, to_text
   implicit none
   private
 
@@ -68,11 +68,7 @@ contains
   pure function labels(plan) result(text)
     type(plan_t), intent(in) :: plan
     character(len=:), allocatable :: text
-    integer :: k
 
-    text = trim(plan%cases(1)%label)
-    do k = 2, size(plan%cases)
-      text = text//', '//trim(plan%cases(k)%label)
-    end do
+    text = joined(plan%cases%label, ', ')
   end function labels
 end module sg_replay

@@ -8,7 +8,7 @@ module sg_write_fields
   use sg_kinds, only: i8
   use sg_posix, only: file_exists
   use sg_random_fields, only: field_values_t
-  use sg_text, only: to_text
+  use sg_text, only: ends_with, to_text
   implicit none
   private
 
@@ -48,8 +48,8 @@ contains
     if (size(chosen) == 0) call raise(error, EXIT_BAD_INPUT, 'no study case with random fields '// &
       'is called '//options%study_case, 'write_fields')
     if (allocated(error)) return
-    if (is_csv(options%write_fields) .and. (size(chosen) > 1 .or. options%realization == 0 .or. &
-      size(records) > 1)) then
+    if (ends_with(options%write_fields, '.csv') .and. (size(chosen) > 1 .or. &
+      options%realization == 0 .or. size(records) > 1)) then
       call raise(error, EXIT_BAD_INPUT, 'a CSV file takes one realization of one field: give '// &
         '--realization (and --study-case), or a file .h5', 'write_fields')
       return
@@ -59,19 +59,13 @@ contains
       call make_case(model, chosen(i), options%realization, records, cases(i), error)
       if (allocated(error)) return
     end do
-    if (is_csv(options%write_fields)) then
+    if (ends_with(options%write_fields, '.csv')) then
       call write_fields_csv(options%write_fields, records(1)%name, records(1)%x, records(1)%y, &
         cases(1)%fields(1)%values(:, 1), error)
     else
       call write_field_file(options%write_fields, records, cases, error)
     end if
   end subroutine write_fields
-
-  pure logical function is_csv(path)
-    character(len=*), intent(in) :: path
-
-    is_csv = index(path, '.csv', back=.true.) == max(len(path) - 3, 1)
-  end function is_csv
 
   !> Only a factor of all points is worth taking several realizations together.
   pure logical function uses_cholesky(record)

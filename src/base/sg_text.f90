@@ -4,7 +4,7 @@ module sg_text
   implicit none
   private
 
-  public :: to_text, lower_case, edit_distance, text_of_duration
+  public :: to_text, lower_case, edit_distance, text_of_duration, joined, ends_with
 
   !> Shortest text of a value: integers without blanks, reals so that reading gives back the same
   !> bits, logicals as true and false.
@@ -17,6 +17,26 @@ module sg_text
   end interface to_text
 
 contains
+
+  !> The words without their trailing blanks, with `between` between them; empty without words.
+  pure function joined(words, between) result(text)
+    character(len=*), intent(in) :: words(:), between
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ''
+    do k = 1, size(words)
+      if (k > 1) text = text//between
+      text = text//trim(words(k))
+    end do
+  end function joined
+
+  pure logical function ends_with(text, ending)
+    character(len=*), intent(in) :: text, ending
+
+    ends_with = len(text) >= len(ending)
+    if (ends_with) ends_with = text(len(text) - len(ending) + 1:) == ending
+  end function ends_with
 
   pure function integer_to_text(value) result(text)
     integer, intent(in) :: value

@@ -5,6 +5,7 @@ module sg_check_desk
   use sg_fault_list, only: did_you_mean, fault_list_t, quoted
   use sg_namelist, only: namelist_t
   use sg_schema, only: count_words, key_row, KEYS, word_at
+  use sg_text, only: joined
   implicit none
   private
 
@@ -66,10 +67,7 @@ contains
     do j = 1, size(desk%config%materials)
       if (.not. desk%good('material', j, 'name')) return
     end do
-    hint = 'allowed: '//trim(desk%config%materials(1)%name)
-    do j = 2, size(desk%config%materials)
-      hint = hint//', '//trim(desk%config%materials(j)%name)
-    end do
+    hint = 'allowed: '//joined(desk%config%materials%name, ', ')
     if (len(did_you_mean(name, desk%config%materials%name, '')) > 0) then
       hint = hint//'; '//did_you_mean(name, desk%config%materials%name, '')
     end if

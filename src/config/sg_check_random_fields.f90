@@ -1,5 +1,6 @@
 !> What the keys of the random fields, and those of the materials they vary, must satisfy together.
 module sg_check_random_fields
+  use sg_angles, only: DEGREE
   use sg_check_desk, only: check_material_name, desk_t
   use sg_config, only: nominal_value, random_field_config_t
   use sg_fault_list, only: quoted
@@ -188,7 +189,6 @@ contains
   subroutine check_dilation(desk, k, m)
     type(desk_t), intent(inout) :: desk
     integer, intent(in) :: k, m
-    real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
     real(wp) :: least
 
     associate (field => desk%config%random_fields(k), material => desk%config%materials(m))

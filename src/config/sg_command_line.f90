@@ -3,7 +3,7 @@ module sg_command_line
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_fault_list, only: did_you_mean
   use sg_kinds, only: wp
-  use sg_text, only: lower_case
+  use sg_text, only: ends_with, lower_case
   implicit none
   private
 
@@ -153,7 +153,7 @@ contains
       options%output = value
     case ('--write-fields')
       options%write_fields = value
-      if (index(value//'|', '.h5|') == 0 .and. index(value//'|', '.csv|') == 0) then
+      if (.not. ends_with(value, '.h5') .and. .not. ends_with(value, '.csv')) then
         call fail(option//' needs '//what_it_needs(option)//instead_of(value), error)
       end if
     case ('--walltime')

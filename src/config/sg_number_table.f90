@@ -4,7 +4,7 @@ module sg_number_table
   use sg_kinds, only: wp
   use sg_number_text, only: parse_real
   use sg_posix, only: read_text
-  use sg_text, only: to_text
+  use sg_text, only: joined, to_text
   implicit none
   private
 
@@ -64,8 +64,8 @@ contains
       start = end + 2
     end do
     if (table%heading == 0) then
-      call raise(error, EXIT_BAD_INPUT, path//':1: the first line must be '//either(headings), &
-        'read_number_table')
+      call raise(error, EXIT_BAD_INPUT, path//':1: the first line must be '// &
+        joined(headings, ' or '), 'read_number_table')
       return
     end if
     table%values = table%values(:, :count)
@@ -81,17 +81,6 @@ contains
 
     text = this%path//':'//to_text(this%line(row))//': '//what
   end function fault
-
-  pure function either(headings) result(text)
-    character(len=*), intent(in) :: headings(:)
-    character(len=:), allocatable :: text
-    integer :: k
-
-    text = trim(headings(1))
-    do k = 2, size(headings)
-      text = text//' or '//trim(headings(k))
-    end do
-  end function either
 
   pure integer function count_of(character, text) result(number)
     character, intent(in) :: character

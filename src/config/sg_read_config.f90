@@ -2,6 +2,7 @@
 !> the schema, then the components of `config_t` are filled, then checked together. All faults are
 !> reported at once.
 module sg_read_config
+  use sg_angles, only: DEGREE
   use sg_check_config, only: check_config
   use sg_check_keys, only: check_keys
   use sg_config, only: config_t, NAME_LENGTH, random_field_config_t
@@ -19,8 +20,6 @@ module sg_read_config
   private
 
   public :: read_config
-
-  real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
   !> Takes values from a scanned case file, or defaults where it has none.
   type, extends(config_visitor_t) :: reader_t

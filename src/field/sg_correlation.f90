@@ -2,6 +2,7 @@
 !> scales of fluctuation along the bedding and across it, the slope of the bedding, and whether
 !> values are those of points or averages over their cells.
 module sg_correlation
+  use sg_angles, only: DEGREE
   use sg_autocorrelation, only: autocorrelation_t
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_kinds, only: wp
@@ -60,7 +61,6 @@ contains
     logical, intent(in), optional :: is_radial
     !> In degrees.
     real(wp), intent(in), optional :: rotation
-    real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
     call this%acf%init(acf, error, smoothness)
     if (allocated(error)) return

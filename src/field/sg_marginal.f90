@@ -7,7 +7,7 @@ module sg_marginal
   use sg_quantile_table, only: CHUNK, quantile_table_t
   use sg_special_functions, only: log_one_plus, normal_cdf, normal_quantile, &
     normal_upper_quantile, normal_upper_tail
-  use sg_text, only: lower_case, to_text
+  use sg_text, only: joined, lower_case, to_text
   use sg_truncated_normal, only: truncated_normal_t
   implicit none
   private
@@ -71,7 +71,8 @@ contains
     this%upper = upper
     fault = ''
     if (this%law == 0) then
-      fault = "no distribution is called '"//trim(distribution)//"' (allowed: "//all_names()//')'
+      fault = "no distribution is called '"//trim(distribution)//"' (allowed: "// &
+        joined(LAW_NAMES, ', ')//')'
     else if (.not. (sd > 0.0_wp .and. sd < huge(sd))) then
       fault = 'the standard deviation must be positive, not '//to_text(sd)
     else if (this%law == LAW_TRUNCATED_NORMAL) then
@@ -419,14 +420,4 @@ contains
       if (lower_case(distribution) == LAW_NAMES(law)) return
     end do
   end function number_of
-
-  pure function all_names() result(names)
-    character(len=:), allocatable :: names
-    integer :: k
-
-    names = trim(LAW_NAMES(1))
-    do k = 2, size(LAW_NAMES)
-      names = names//', '//trim(LAW_NAMES(k))
-    end do
-  end function all_names
 end module sg_marginal

@@ -1,6 +1,7 @@
 !> A scene: everything that all members of an ensemble share. It is built once and never changes.
 module sg_scene
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use sg_angles, only: DEGREE
   use sg_bodies, only: body_lattice_t, fill_body, is_inside
   use sg_config, only: config_t, EDGE_TOLERANCE
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
@@ -18,8 +19,6 @@ module sg_scene
   private
 
   public :: scene_t, build_scene, set_properties
-
-  real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
   type :: scene_t
     type(material_t), allocatable :: materials(:)

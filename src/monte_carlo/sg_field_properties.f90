@@ -1,6 +1,7 @@
 !> Between random fields and the points of a scene: which points there are, and which properties
 !> they get.
 module sg_field_properties
+  use sg_angles, only: DEGREE
   use sg_config, only: config_t, nominal_value
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_kinds, only: wp
@@ -122,7 +123,6 @@ contains
   !> Angle in degrees of a tangent.
   elemental real(wp) function angle_of(tangent)
     real(wp), intent(in) :: tangent
-    real(wp), parameter :: DEGREE = acos(-1.0_wp)/180.0_wp
 
     angle_of = atan(tangent)/DEGREE
   end function angle_of

@@ -7,7 +7,7 @@ module sg_field_record
   use sg_kinds, only: i4, i8, wp
   use sg_number_table, only: number_table_t, read_number_table
   use sg_posix, only: replace_file, write_file
-  use sg_text, only: to_text
+  use sg_text, only: ends_with, to_text
   implicit none
   private
 
@@ -183,7 +183,7 @@ contains
     integer(i8) :: id
 
     this%path = path
-    if (index(path, '.csv', back=.true.) == len(path) - 3) then
+    if (ends_with(path, '.csv')) then
       call read_csv(path, name, file_x, file_y, this%values, error)
     else
       call look_into(this, path, name, file_x, file_y, error)
