@@ -14,6 +14,7 @@ from . import __version__, figures
 from .analysis import analyse
 from .ensemble import FLOAT_COLUMNS, INTEGER_COLUMNS, RUNOUTS, STATUS_TEXTS, read_ensemble
 from .errors import PostError
+from .field_figures import UNIT_TEXTS
 from .fits import LAWS
 from .snapshots import find_snapshots, read_snapshot
 
@@ -42,6 +43,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
             warnings=warnings(summary),
             runouts=RUNOUTS,
             laws=LAWS,
+            field_unit=_field_unit(ensemble),
             post_version=__version__,
         )
     )
@@ -126,6 +128,12 @@ def _study_sentence(summary: dict) -> str:
             " farther than homogeneous ground"
         )
     return text + "."
+
+
+def _field_unit(ensemble) -> str:
+    """Of the property that the first random field varies, as the columns field_* have it."""
+    unit = next((case.units.get("field_mean", "") for case in ensemble.cases), "")
+    return UNIT_TEXTS.get(unit, unit)
 
 
 def warnings(summary: dict) -> list:

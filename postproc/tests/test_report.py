@@ -330,3 +330,15 @@ def test_a_browser_renders_the_page(tmp_path, capsys):
         check=True,
     ).stdout
     assert "58 members ok" in dump
+
+
+def test_field_columns_have_their_unit(tmp_path, capsys):
+    """Cohesion in pascals, an angle in degrees."""
+    for unit, shown in (("Pa", "mean of field means [Pa]"), ("degree", "mean of field means [°]")):
+        directory = tmp_path / unit
+        write_ensemble(directory, [HOMOGENEOUS, base(5)], "complete")
+        with h5py.File(directory / "ensemble.h5", "r+") as file:
+            for case in file["cases"].values():
+                case["field_mean"].attrs["units"] = unit
+        html, _ = report(directory, capsys)
+        assert shown in html
