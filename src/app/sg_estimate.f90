@@ -1,9 +1,9 @@
 !> What a run would take, without writing anything: `--check`.
 module sg_estimate
-  use sg_collapse, only: prepare_fields
   use sg_config, only: config_t
   use sg_errors, only: error_t
   use sg_field_properties, only: points_of_materials
+  use sg_ground, only: prepare_fields
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
@@ -12,12 +12,13 @@ module sg_estimate
   use sg_random_fields, only: random_fields_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
+  use sg_study, only: variant_t
   use sg_text, only: text_of_duration, to_text
   use sg_variation, only: variation_t
   implicit none
   private
 
-  public :: estimate_text
+  public :: estimate_text, listing_text
 
   !> Steps that are run to learn the speed of this machine.
   integer, parameter :: TRIAL_STEPS = 100
@@ -26,20 +27,62 @@ module sg_estimate
 
 contains
 
-  !> The plan in words. Runs a hundred steps to learn the cost of one.
-  subroutine estimate_text(config, plan, text, error)
-    type(config_t), intent(in) :: config
+  !> The plan in words. Runs a hundred steps of each variant to learn the cost of one.
+  subroutine estimate_text(variants, plan, text, error)
+    type(variant_t), intent(in) :: variants(:)
     type(plan_t), intent(in) :: plan
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
     type(scene_t) :: scene
+    character(len=:), allocatable :: more
+    real(wp) :: seconds(size(variants)), megabytes
+    integer(i8) :: members
+    integer :: k, v
+
+    do v = 1, size(variants)
+      call build_scene(variants(v)%config, scene, error)
+      if (allocated(error)) return
+      call describe_variant(variants(v)%config, scene, more, seconds(v), error)
+      if (allocated(error)) return
+      if (v == 1) then
+        text = more
+      else
+        text = text//line('another variant '//trim(adjustl(variants(v)%varied//merge( &
+          ' (control variate)', '                  ', variants(v)%twin_of > 0)))//': '// &
+          to_text(scene%particles%count)//' points, one member about '// &
+          text_of_duration(seconds(v)))
+      end if
+    end do
+    members = plan%total()
+    megabytes = 0.0_wp
+    do k = 1, size(plan%cases)
+      associate (grid => variants(plan%cases(k)%variant)%config%grid)
+        megabytes = megabytes + real(plan%members_of(k), wp)*(8.0_wp*COLUMN_COUNT + 4.0_wp &
+          *(grid%x_max - grid%x_min)/grid%cell_size + 32.0_wp)*2.0_wp*1.0e-6_wp
+      end associate
+    end do
+    text = text//line( &
+      'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '// &
+      case_list(plan))//line( &
+      'all             about '//to_text(sum([(plan%members_of(k)*seconds(plan%cases(k)%variant), &
+      k=1, size(plan%cases))])/3600.0_wp, 3)//' core-hours')//line( &
+      'disk            about '//to_text(megabytes, 3)//' MB, snapshots not counted')//line( &
+      'directory       '//variants(1)%config%output%directory)
+  end subroutine estimate_text
+
+  !> One variant in words, and the seconds that a member of it takes here and now.
+  subroutine describe_variant(config, scene, text, member_seconds, error)
+    type(config_t), intent(in) :: config
+    type(scene_t), intent(in) :: scene
+    character(len=:), allocatable, intent(out) :: text
+    real(wp), intent(out) :: member_seconds
+    type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: field
-    real(wp) :: step_seconds, member_seconds, megabytes, limit
-    integer(i8) :: steps_needed, members
+    real(wp) :: step_seconds, limit
+    integer(i8) :: steps_needed
     integer :: cells_x, cells_y
 
-    call build_scene(config, scene, error)
-    if (allocated(error)) return
+    member_seconds = 0.0_wp
     call describe_field(config, scene, field, error)
     if (allocated(error)) return
     cells_x = nint((config%grid%x_max - config%grid%x_min)/config%grid%cell_size)
@@ -48,8 +91,6 @@ contains
     steps_needed = ceiling(config%solver%end_time/scene%first_step, i8)
     step_seconds = time_step_cost(config, scene)
     member_seconds = FLOW_FACTOR*step_seconds*real(steps_needed, wp)
-    members = plan%total()
-    megabytes = real(members, wp)*(8.0_wp*COLUMN_COUNT + 4.0_wp*cells_x + 32.0_wp)*2.0_wp*1.0e-6_wp
     text = 'case            '//trim(config%name)//line( &
       'points          '//to_text(scene%particles%count)//' in '//to_text(size(config%bodies))// &
       ' bodies')//line( &
@@ -64,18 +105,31 @@ contains
       to_text(config%solver%end_time)// &
       ' s, fewer if it comes to rest')//line( &
       'random field    '//field)//line( &
-      'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '// &
-      case_list(plan))//line( &
       'one member      about '//text_of_duration(member_seconds)//' ('// &
       to_text(1.0e9_wp*step_seconds/scene%particles%count, &
-      3)//' ns per point and step here and now)')//line( &
-      'all             about '//to_text(members*member_seconds/3600.0_wp, &
-      3)//' core-hours')//line( &
-      'disk            about '//to_text(megabytes, 3)//' MB, snapshots not counted')//line( &
-      'directory       '//config%output%directory)
+      3)//' ns per point and step here and now)')
     if (scene%first_step > limit) text = text//line( &
       'warning         the time step is above its limit: expect members to fail')
-  end subroutine estimate_text
+  end subroutine describe_variant
+
+  !> Every case of the plan with its members: `--dry`.
+  pure function listing_text(plan) result(text)
+    type(plan_t), intent(in) :: plan
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ''
+    do k = 1, size(plan%cases)
+      associate (one => plan%cases(k))
+        text = text//trim(one%label)//': '//to_text(plan%members_of(k))//' members'
+        if (one%varied /= '') text = text//', '//trim(one%varied)
+        if (one%control_of > 0) text = text//', control variate of '// &
+          trim(plan%cases(one%control_of)%label)
+        text = text//new_line('a')
+      end associate
+    end do
+    text = text//to_text(plan%total())//' members in '//to_text(size(plan%cases))//' cases'
+  end function listing_text
 
   pure function line(text) result(with_break)
     character(len=*), intent(in) :: text
@@ -93,7 +147,7 @@ contains
 
     description = 'none: the run is deterministic'
     if (.not. config%has_random_field) return
-    call prepare_fields(config, points_of_materials(scene), fields, error)
+    call prepare_fields(config, points_of_materials(scene), .true., fields, error)
     if (allocated(error)) return
     call fields(size(fields))%estimate(bytes, description, error)
     if (allocated(error) .or. size(fields) == 1) return
@@ -128,7 +182,7 @@ contains
     text = ''
     do k = 1, min(SHOWN, size(plan%cases))
       if (k > 1) text = text//', '
-      text = text//trim(plan%cases(k)%label)//' ('//to_text(plan%cases(k)%member_count)//')'
+      text = text//trim(plan%cases(k)%label)//' ('//to_text(plan%members_of(k))//')'
     end do
     if (size(plan%cases) > SHOWN) text = text//', ...'
   end function case_list

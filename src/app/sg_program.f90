@@ -5,16 +5,17 @@ module sg_program
   use sg_collapse, only: collapse_model_t
   use sg_comm, only: comm_t
   use sg_command_line, only: options_t, parse_command_line, usage_text
-  use sg_config, only: config_t
   use sg_driver, only: run_ensemble, run_request_t
-  use sg_errors, only: error_t, EXIT_INTERNAL, EXIT_OK
-  use sg_estimate, only: estimate_text
+  use sg_ensemble, only: case_geometry_t
+  use sg_errors, only: error_t, EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_OK, raise
+  use sg_estimate, only: estimate_text, listing_text
   use sg_key_listing, only: print_defaults, print_keys
   use sg_plan, only: create_plan, plan_t
   use sg_posix, only: read_text
-  use sg_read_config, only: read_config
+  use sg_read_config, only: read_variants
   use sg_replay, only: choose_member, replay_member
-  use sg_resolved, only: compare_configs, resolved_text
+  use sg_resolved, only: compare_configs, identity_text, resolved_text
+  use sg_study, only: variant_t
   use sg_text, only: to_text
   use sg_version, only: GIT_HASH, VERSION
   use sg_write_fields, only: write_fields
@@ -62,24 +63,30 @@ contains
     type(options_t), intent(in) :: options
     integer, intent(out) :: exit_code
     type(error_t), allocatable, intent(out) :: error
-    type(config_t) :: config
+    type(variant_t), allocatable :: variants(:)
     type(plan_t) :: plan
     type(collapse_model_t) :: model
     type(run_request_t) :: request
     character(len=:), allocatable :: text
-    integer :: case_index
+    integer :: case_index, v
 
     exit_code = EXIT_OK
-    call load_case(comm, options%case_file, text, config, error)
+    call load_case(comm, options%case_file, text, variants, error)
     if (allocated(error)) return
-    if (options%output /= '') config%output%directory = options%output
-    call create_plan(config, plan)
-    if (options%realization > 0 .and. options%write_fields == '') then
+    do v = 1, size(variants)
+      if (options%output /= '') variants(v)%config%output%directory = options%output
+    end do
+    call create_plan(variants, plan)
+    call limit_plan(options, plan, error)
+    if (options%realization > 0 .and. options%write_fields == '' .and. .not. allocated(error)) then
       call choose_member(plan, options, case_index, error)
     end if
     if (allocated(error)) return
-    if (options%check) then
-      if (comm%rank() == 0) call say_estimate(comm, config, plan, error)
+    if (options%dry) then
+      call say(comm, listing_text(plan))
+      return
+    else if (options%check) then
+      if (comm%rank() == 0) call say_estimate(comm, variants, plan, error)
       if (options%realization > 0 .and. .not. allocated(error)) call say(comm, &
         'realization     '//to_text(options%realization)//' of '// &
         trim(plan%cases(case_index)%label)//' can be computed by itself')
@@ -87,7 +94,7 @@ contains
       return
     end if
     if (comm%rank() == 0 .or. (options%realization == 0 .and. options%write_fields == '')) then
-      call model%init(config, plan, error)
+      call model%init(variants, plan, error)
     end if
     call comm%agree(error)
     if (allocated(error)) return
@@ -99,29 +106,64 @@ contains
       if (comm%rank() == 0) call replay_member(model, options, case_index)
       return
     end if
-    request%config = config
+    request%config = variants(1)%config
     request%plan = plan
-    request%profile_x = model%scene%profile_x
+    request%geometries = geometries_of(model)
     request%case_text = text
-    request%resolved = resolved_text(config)
-    request%field_method = model%field_method()
-    request%fields = model%field_records()
-    request%toe = model%scene%toe
-    request%initial_width = model%scene%extent(2) - model%scene%extent(1)
-    request%initial_height = model%scene%extent(4) - model%scene%extent(3)
-    request%point_spacing = maxval(model%scene%particles%bodies%width)
+    request%resolved = resolved_text(request%config)
+    request%identity = identity_text(request%config)
+    request%field_method = model%grounds(model%field_ground())%field_method()
+    request%fields = model%grounds(model%field_ground())%field_records()
     request%overwrite = options%overwrite
     request%walltime = options%walltime
     request%compare => compare_configs
     call run_ensemble(comm, request, model, exit_code, error)
   end subroutine run_case
 
-  !> Rank 0 reads the file; every rank reads the configuration out of the same text.
-  subroutine load_case(comm, file_name, text, config, error)
+  !> Leaves to the plan the members that the options ask for; none at all is bad input.
+  subroutine limit_plan(options, plan, error)
+    type(options_t), intent(in) :: options
+    type(plan_t), intent(inout) :: plan
+    type(error_t), allocatable, intent(out) :: error
+
+    plan%first = options%members(1)
+    plan%last = options%members(2)
+    if (plan%total() == 0) call raise(error, EXIT_BAD_INPUT, '--members '// &
+      to_text(plan%first)//'-'//to_text(plan%last)//': there is no such member (allowed: 1 to '// &
+      to_text(maxval(plan%cases%member_count))//')', 'command line')
+  end subroutine limit_plan
+
+  !> Of each case of the plan.
+  function geometries_of(model) result(geometries)
+    type(collapse_model_t), intent(in) :: model
+    type(case_geometry_t), allocatable :: geometries(:)
+    integer :: k
+
+    allocate (geometries(size(model%plan%cases)))
+    do k = 1, size(geometries)
+      associate (g => geometries(k), ground => model%grounds(model%plan%cases(k)%variant))
+        associate (scene => ground%scene, grid => ground%config%grid)
+          g%toe = scene%toe
+          g%initial_width = scene%extent(2) - scene%extent(1)
+          g%initial_height = scene%extent(4) - scene%extent(3)
+          g%point_spacing = maxval(scene%particles%bodies%width)
+          g%x_min = grid%x_min
+          g%x_max = grid%x_max
+          g%y_min = grid%y_min
+          g%y_max = grid%y_max
+          g%cell_size = grid%cell_size
+          g%profile_x = scene%profile_x
+        end associate
+      end associate
+    end do
+  end function geometries_of
+
+  !> Rank 0 reads the file; every rank reads the variants of the case out of the same text.
+  subroutine load_case(comm, file_name, text, variants, error)
     type(comm_t), intent(in) :: comm
     character(len=*), intent(in) :: file_name
     character(len=:), allocatable, intent(out) :: text
-    type(config_t), intent(out) :: config
+    type(variant_t), allocatable, intent(out) :: variants(:)
     type(error_t), allocatable, intent(out) :: error
 
     text = ''
@@ -129,17 +171,17 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     call comm%broadcast_text(text)
-    call read_config(text, file_name, config, error)
+    call read_variants(text, file_name, variants, error)
   end subroutine load_case
 
-  subroutine say_estimate(comm, config, plan, error)
+  subroutine say_estimate(comm, variants, plan, error)
     type(comm_t), intent(in) :: comm
-    type(config_t), intent(in) :: config
+    type(variant_t), intent(in) :: variants(:)
     type(plan_t), intent(in) :: plan
     type(error_t), allocatable, intent(out) :: error
     character(len=:), allocatable :: text
 
-    call estimate_text(config, plan, text, error)
+    call estimate_text(variants, plan, text, error)
     if (.not. allocated(error)) call say(comm, text)
   end subroutine say_estimate
 

@@ -23,10 +23,12 @@ contains
     type(options_t), intent(in) :: options
     integer, intent(out) :: case_index
     type(error_t), allocatable, intent(out) :: error
+    logical :: several
 
     if (options%study_case == '') then
       case_index = size(plan%cases)
-      if (case_index > 2) call raise(error, EXIT_BAD_INPUT, &
+      several = count(plan%cases%is_homogeneous) > 1 .or. count(.not. plan%cases%is_homogeneous) > 1
+      if (several) call raise(error, EXIT_BAD_INPUT, &
         '--realization of a study needs --study-case, one of: '//labels(plan), 'choose_member')
     else
       case_index = plan%find_case(options%study_case)
@@ -62,7 +64,7 @@ contains
         to_text(outcome%values(k)), trim(COLUMNS(k)%units)
     end do
     if (options%snapshots) write (output_unit, &
-      '(a)') '  written to '//model%config%output%directory//'/snapshots'
+      '(a)') '  written to '//model%grounds(1)%config%output%directory//'/snapshots'
   end subroutine replay_member
 
   pure function labels(plan) result(text)

@@ -31,7 +31,7 @@ contains
     logical :: is_there
     integer :: i
 
-    allocate (records, source=model%field_records())
+    allocate (records, source=model%grounds(model%field_ground())%field_records())
     is_there = file_exists(options%write_fields)
     if (is_there .and. .not. options%overwrite) then
       call raise(error, EXIT_BAD_INPUT, options%write_fields//' is there already (allowed: '// &
@@ -48,6 +48,14 @@ contains
     if (size(chosen) == 0) call raise(error, EXIT_BAD_INPUT, 'no study case with random fields '// &
       'is called '//options%study_case, 'write_fields')
     if (allocated(error)) return
+    associate (variant => model%plan%cases(chosen(1))%variant)
+      if (any(model%plan%cases(chosen)%variant /= variant)) then
+        call raise(error, EXIT_BAD_INPUT, 'the fields of a study that varies more than acf and '// &
+          'cov are written case by case: give --study-case', 'write_fields')
+        return
+      end if
+      records = model%grounds(variant)%field_records()
+    end associate
     if (ends_with(options%write_fields, '.csv') .and. (size(chosen) > 1 .or. &
       options%realization == 0 .or. size(records) > 1)) then
       call raise(error, EXIT_BAD_INPUT, 'a CSV file takes one realization of one field: give '// &

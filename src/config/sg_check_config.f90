@@ -48,6 +48,7 @@ contains
     call check_solver(desk)
     if (config%has_random_field) call check_random_fields(desk)
     if (config%has_study) call check_study(desk)
+    if (config%has_control_variate) call check_control_variate(desk)
     call check_output(desk)
     faults = desk%faults
   end subroutine check_config
@@ -353,19 +354,16 @@ contains
     g = desk%nml%locate('study', 1)
     if (desk%nml%groups(g)%number == 0) then
       call desk%faults%add(desk%nml%groups(g)%line, '&study', &
-        'this group lists nothing (give acf, '// &
-        'cov or both, or leave the group out)')
+        'this group lists nothing (give acf, cov or other keys, or leave the group out)')
     end if
     associate (study => desk%config%study)
-      if (desk%good('study', 1, 'acf')) then
+      if (desk%config%has_random_field .and. desk%good('study', 1, 'acf')) then
         do i = 2, size(study%acf)
-          do j = 1, i - 1
-            if (study%acf(i) == study%acf(j)) call desk%fault('study', 1, 'acf', &
-              quoted(study%acf(i))//' is listed twice')
-          end do
+          if (any(study%acf(:i - 1) == study%acf(i))) call desk%fault('study', 1, 'acf', &
+            quoted(study%acf(i))//' is listed twice')
         end do
       end if
-      if (desk%good('study', 1, 'cov')) then
+      if (desk%config%has_random_field .and. desk%good('study', 1, 'cov')) then
         do i = 2, size(study%cov)
           do j = 1, i - 1
             if (study%cov(i) == study%cov(j)) call desk%fault('study', 1, 'cov', &
@@ -375,6 +373,25 @@ contains
       end if
     end associate
   end subroutine check_study
+
+  !> There are enough twins on coarser cells. (That they are coarser is seen where they are made.)
+  subroutine check_control_variate(desk)
+    type(desk_t), intent(inout) :: desk
+
+    associate (control => desk%config%control_variate)
+      if (desk%good('control_variate', 1, 'realizations') .and. desk%good('monte_carlo', 1, &
+        'realizations')) then
+        if (control%realizations < desk%config%monte_carlo%realizations) call desk%fault( &
+          'control_variate', 1, 'realizations', to_text(control%realizations)// &
+          ' are fewer than the cases have, '//to_text(desk%config%monte_carlo%realizations)// &
+          ' (allowed: at least as many)')
+      end if
+      if (desk%good('monte_carlo', 1, 'sampling')) then
+        if (desk%config%monte_carlo%sampling /= 'random') call desk%fault('control_variate', 1, &
+          'realizations', 'members must be independent (allowed: sampling = ''random'')')
+      end if
+    end associate
+  end subroutine check_control_variate
 
   subroutine check_output(desk)
     type(desk_t), intent(inout) :: desk

@@ -8,11 +8,12 @@ module sg_check_keys
   use sg_number_text, only: parse_integer, parse_real, range_holds, range_in_words
   use sg_schema, only: ANY_NUMBER, count_words, group_row, GROUPS, has_word, key_row, key_t, KEYS, &
     KIND_INTEGER, KIND_NAME, KIND_REAL, KIND_WORD, listed, word_at
+  use sg_study_keys, only: can_be_listed, find_study_key
   use sg_text, only: lower_case, to_text
   implicit none
   private
 
-  public :: check_keys, why_not
+  public :: check_keys, check_study_keys, why_not
 
   character(len=*), parameter :: NOT_YET = ' is not in this version yet'
   character(len=*), parameter :: NAME_CHARACTERS = &
@@ -33,6 +34,50 @@ contains
       if (group_is_known(nml, g, faults)) call check_group(nml, g, faults)
     end do
   end subroutine check_keys
+
+  !> The keys of other groups that &study lists: adds what is wrong to `faults` and marks those that
+  !> can be used. Comes before `check_keys`, which leaves them alone: their first values must stand
+  !> in their groups by then.
+  subroutine check_study_keys(nml, faults)
+    type(namelist_t), intent(inout) :: nml
+    type(fault_list_t), intent(inout) :: faults
+    integer :: e, g
+
+    g = nml%locate('study', 1)
+    if (g == 0) return
+    do e = 1, nml%groups(g)%number
+      if (key_row('study', nml%groups(g)%entries(e)%key) > 0) cycle
+      if (nml%groups(g)%entries(e)%spoilt) cycle
+      call check_study_key(nml, g, e, faults)
+    end do
+  end subroutine check_study_keys
+
+  subroutine check_study_key(nml, g, e, faults)
+    type(namelist_t), intent(inout) :: nml
+    integer, intent(in) :: g, e
+    type(fault_list_t), intent(inout) :: faults
+    type(key_t) :: key
+    character(len=:), allocatable :: name, fault
+    integer :: row, occurrence, first
+
+    name = nml%groups(g)%entries(e)%key
+    call find_study_key(nml, name, row, occurrence, fault)
+    first = nml%groups(g)%find(name)
+    if (len(fault) > 0) then
+      call faults%add(nml%groups(g)%entries(e)%line, '&study '//name, fault)
+    else if (row == 0) then
+      call report_unknown(nml%groups(g), e, faults)
+    else if (first < e) then
+      call faults%add(nml%groups(g)%entries(e)%line, '&study '//name, &
+        'given twice; the first one is in line '//to_text(nml%groups(g)%entries(first)%line))
+    else
+      key = KEYS(row)
+      key%group = 'study'
+      key%name = name
+      key%size = ANY_NUMBER
+      call check_entry(key, nml%groups(g)%entries(e), faults)
+    end if
+  end subroutine check_study_key
 
   !> A group that is required, by itself or by another group, and missing. One that a misspelt group
   !> was meant to be is not reported a second time.
@@ -107,7 +152,9 @@ contains
     do e = 1, nml%groups(g)%number
       row = key_row(nml%groups(g)%name, nml%groups(g)%entries(e)%key)
       if (row == 0) then
-        if (.not. nml%groups(g)%entries(e)%spoilt) call report_unknown(nml%groups(g), e, faults)
+        if (.not. nml%groups(g)%entries(e)%spoilt .and. nml%groups(g)%name /= 'study') then
+          call report_unknown(nml%groups(g), e, faults)
+        end if
         cycle
       end if
       first = nml%groups(g)%find(nml%groups(g)%entries(e)%key)
@@ -140,6 +187,8 @@ contains
 
     key = group%entries(e)%key
     hint = key_meant(group%name, key)
+    if (len(hint) == 0 .and. group%name == 'study') hint = did_you_mean(key, pack(KEYS%name, &
+      can_be_listed(KEYS)), '')
     if (len(hint) == 0) then
       do row = size(KEYS), 1, -1
         if (KEYS(row)%name == key) hint = 'did you mean '//trim(key)//' of &'// &
@@ -221,7 +270,7 @@ contains
       text = text//'; allowed: '//listed(key%choices)
     else if (len(range_in_words(key%range)) > 0) then
       text = text//'; allowed: '//allowed_numbers(key)
-    else if (len_trim(key%unit) > 0) then
+    else if (len_trim(key%unit) > 0 .and. key%unit /= '1') then
       text = text//', in '//trim(key%unit)
     end if
     text = text//')'

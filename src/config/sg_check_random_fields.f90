@@ -215,13 +215,13 @@ contains
     integer, intent(in) :: k
 
     associate (field => desk%config%random_fields(k))
-      if (is_given(desk, k, 'cov') .and. is_given(desk, k, 'sd')) then
+      if (is_given(desk, GROUP, k, 'cov') .and. is_given(desk, GROUP, k, 'sd')) then
         call desk%fault(GROUP, k, 'sd', 'cov is given, too (allowed: one of them)')
-      else if (k == 1 .and. is_given(desk, k, 'sd') .and. desk%config%has_study) then
+      else if (k == 1 .and. is_given(desk, GROUP, k, 'sd') .and. desk%config%has_study) then
         if (any(desk%config%study%cov > 0.0_wp)) call desk%fault(GROUP, k, 'sd', '&study lists '// &
           'cov, which takes its place (allowed: one of them)')
-      else if (size(field%cov) == 0 .and. size(field%sd) == 0 .and. .not. is_given(desk, k, 'cov') &
-        .and. .not. is_given(desk, k, 'sd')) then
+      else if (size(field%cov) == 0 .and. size(field%sd) == 0 .and. .not. is_given(desk, GROUP, k, &
+        'cov') .and. .not. is_given(desk, GROUP, k, 'sd')) then
         call desk%fault(GROUP, k, 'cov', 'this key is missing (Coefficient of variation; '// &
           'allowed: cov, or sd, the standard deviation)')
       end if
@@ -234,13 +234,13 @@ contains
     end associate
   end subroutine check_moments
 
-  logical function is_given(desk, k, key)
+  logical function is_given(desk, group_name, occurrence, key)
     type(desk_t), intent(in) :: desk
-    integer, intent(in) :: k
-    character(len=*), intent(in) :: key
+    character(len=*), intent(in) :: group_name, key
+    integer, intent(in) :: occurrence
     integer :: g
 
-    g = desk%nml%locate(GROUP, k)
+    g = desk%nml%locate(group_name, occurrence)
     is_given = .false.
     if (g > 0) is_given = desk%nml%groups(g)%find(key) > 0
   end function is_given
@@ -454,7 +454,8 @@ contains
       end if
       if (field%file /= '' .and. field%data /= '') call desk%fault(GROUP, k, 'data', &
         'fields from a file are what they are (allowed: data or file)')
-      if (field%file /= '' .and. desk%config%has_study) call desk%fault(GROUP, k, 'file', &
+      if (field%file /= '' .and. (is_given(desk, 'study', 1, 'acf') .or. is_given(desk, 'study', &
+        1, 'cov'))) call desk%fault(GROUP, k, 'file', &
         'fields from a file are no study of correlation functions (allowed: without &study)')
     end associate
   end subroutine check_correlation

@@ -2,7 +2,7 @@
 module sg_command_line
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_fault_list, only: did_you_mean
-  use sg_kinds, only: wp
+  use sg_kinds, only: i8, wp
   use sg_text, only: ends_with, lower_case
   implicit none
   private
@@ -12,13 +12,15 @@ module sg_command_line
   type :: options_t
     !> The case file; empty where none is needed.
     character(len=:), allocatable :: case_file
-    logical :: check = .false., keys = .false., json = .false., defaults = .false.
+    logical :: check = .false., dry = .false., keys = .false., json = .false., defaults = .false.
     logical :: snapshots = .false., overwrite = .false., version = .false., help = .false.
     !> Group for --keys; empty for all.
     character(len=:), allocatable :: keys_group
     !> Member to replay; 0 for none, and the case it belongs to; empty for the only one.
     integer :: realization = 0
     character(len=:), allocatable :: study_case
+    !> First and last id that this run computes; all by default.
+    integer(i8) :: members(2) = [1_i8, huge(1_i8)]
     !> Directory instead of that of the case file; empty for none.
     character(len=:), allocatable :: output
     !> File that the random fields are written to, instead of running; empty for none.
@@ -27,8 +29,8 @@ module sg_command_line
     real(wp) :: walltime = 0.0_wp
   end type options_t
 
-  character(len=*), parameter :: KNOWN(13) = [character(len=14) :: '--check', '--keys', '--json', &
-    '--defaults', '--write-fields', &
+  character(len=*), parameter :: KNOWN(15) = [character(len=14) :: '--check', '--dry', '--keys', &
+    '--json', '--defaults', '--write-fields', '--members', &
     '--realization', '--study-case', '--snapshots', '--output', '--overwrite', '--walltime', &
     '--version', '--help']
 
@@ -83,7 +85,7 @@ contains
     if (index(option, '--') == 1) equals = index(option, '=')
     if (equals > 0) option = option(:equals - 1)
     select case (option)
-    case ('--study-case', '--output', '--realization', '--walltime', '--write-fields')
+    case ('--study-case', '--output', '--realization', '--walltime', '--write-fields', '--members')
       if (equals > 0) then
         call take_value(option, trim(words(k) (equals + 1:)), options, error)
       else if (k == size(words)) then
@@ -115,6 +117,8 @@ contains
     select case (option)
     case ('--check')
       options%check = .true.
+    case ('--dry')
+      options%dry = .true.
     case ('--keys')
       options%keys = .true.
     case ('--json')
@@ -158,6 +162,8 @@ contains
       end if
     case ('--walltime')
       call read_duration(value, options%walltime, error)
+    case ('--members')
+      call read_range(value, options%members, error)
     case default ! --realization
       read (value, *, iostat=status) options%realization
       if (status /= 0 .or. options%realization < 1 .or. verify(value, '0123456789') > 0) then
@@ -179,6 +185,8 @@ contains
       text = 'the name of a file, .h5 or .csv'
     case ('--walltime')
       text = 'HH:MM:SS above zero'
+    case ('--members')
+      text = 'first and last id, as 1-250'
     case default ! --realization
       text = 'a whole number from 1 on'
     end select
@@ -218,6 +226,23 @@ contains
     text = did_you_mean(word, KNOWN, '')
     if (text /= '') text = ' ('//text//')'
   end function suggestion
+
+  !> Two whole numbers with a dash between them.
+  subroutine read_range(text, range, error)
+    character(len=*), intent(in) :: text
+    integer(i8), intent(out) :: range(2)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: dash, status
+
+    range = [1_i8, huge(1_i8)]
+    dash = index(text, '-')
+    status = verify(text, '0123456789-')
+    if (dash < 2 .or. dash == len(text) .or. index(text(dash + 1:), '-') > 0) status = 1
+    if (status == 0) read (text(:dash - 1), *, iostat=status) range(1)
+    if (status == 0) read (text(dash + 1:), *, iostat=status) range(2)
+    if (status == 0 .and. range(1) > 0 .and. range(1) <= range(2)) return
+    call fail('--members needs '//what_it_needs('--members')//instead_of(text), error)
+  end subroutine read_range
 
   !> Hours:minutes:seconds, minutes:seconds, or seconds.
   subroutine read_duration(text, seconds, error)
@@ -266,6 +291,9 @@ contains
       'default, range, meaning'//N// &
       '        sgimp --defaults                             a case file to start from'//N//N// &
       '  --check                 check the case and say what it would take; writes nothing'//N// &
+      '  --dry                   list the cases of the study and their members; runs nothing'//N// &
+      '  --members FIRST-LAST    compute these ids only, as one job of an array '// &
+      '(sgimp-post merge)'//N// &
       '  --output DIR            directory of the results, instead of the one in the case file'// &
       N// &
       '  --overwrite             throw away what the directory holds'//N// &

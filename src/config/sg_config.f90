@@ -9,7 +9,7 @@ module sg_config
   public :: config_t, grid_config_t, material_config_t, body_config_t, boundary_config_t
   public :: loading_config_t
   public :: solver_config_t, random_field_config_t, cross_correlation_config_t
-  public :: monte_carlo_config_t, study_config_t
+  public :: monte_carlo_config_t, study_config_t, study_list_t, control_variate_config_t
   public :: output_config_t
   public :: NAME_LENGTH, EDGE_TOLERANCE, nominal_value
 
@@ -124,12 +124,30 @@ module sg_config
     real(wp) :: member_seconds
   end type monte_carlo_config_t
 
+  !> A key of another group that the study lists.
+  type :: study_list_t
+    !> As it is written in &study: `damping`, `grid%x_max` or `body(2)%height`.
+    character(len=NAME_LENGTH) :: name = ''
+    !> Its row in KEYS of sg_schema, and the number of its group among those of its name.
+    integer :: row = 0, occurrence = 1
+    !> Numbers in their shortest text, or words.
+    character(len=NAME_LENGTH), allocatable :: values(:)
+  end type study_list_t
+
   type :: study_config_t
     !> Every combination is a case, by the first field. Size 1 with the value of &random_field where
     !> &study does not list the key; cov is 0 where that field has sd instead.
     character(len=NAME_LENGTH), allocatable :: acf(:)
     real(wp), allocatable :: cov(:)
+    !> The other keys, in the order of the file. Their groups hold the first value of each.
+    type(study_list_t), allocatable :: lists(:)
   end type study_config_t
+
+  !> The twins on coarser cells, and how many realizations of them there are.
+  type :: control_variate_config_t
+    real(wp) :: cell_size = 0.0_wp
+    integer :: realizations = 0
+  end type control_variate_config_t
 
   type :: output_config_t
     character(len=:), allocatable :: directory
@@ -158,6 +176,8 @@ module sg_config
     !> False: no &study group, the heterogeneous case is called `base`.
     logical :: has_study = .false.
     type(study_config_t) :: study
+    logical :: has_control_variate = .false.
+    type(control_variate_config_t) :: control_variate
     type(output_config_t) :: output
   end type config_t
 contains

@@ -1,7 +1,7 @@
 !> Which component of `config_t` belongs to which key: said once, for reading and for writing.
 !> Within a group, a key that decides whether others apply comes before them.
 module sg_config_fields
-  use sg_config, only: config_t, NAME_LENGTH
+  use sg_config, only: config_t, NAME_LENGTH, study_list_t
   use sg_kinds, only: i8, wp
   implicit none
   private
@@ -21,6 +21,7 @@ module sg_config_fields
     procedure(visit_word_interface), deferred :: visit_word
     procedure(visit_words_interface), deferred :: visit_words
     procedure(visit_text_interface), deferred :: visit_text
+    procedure(visit_study_lists_interface), deferred :: visit_study_lists
     generic :: visit => visit_real, visit_integer, visit_long, visit_word
     generic :: visit_list => visit_reals, visit_integers, visit_words
   end type config_visitor_t
@@ -106,6 +107,14 @@ module sg_config_fields
       character(len=*), intent(in) :: key
       character(len=:), allocatable, intent(inout) :: value
     end subroutine visit_text_interface
+
+    !> The keys of other groups that &study lists.
+    subroutine visit_study_lists_interface(this, lists)
+      import :: config_visitor_t, study_list_t
+      implicit none
+      class(config_visitor_t), intent(inout) :: this
+      type(study_list_t), allocatable, intent(inout) :: lists(:)
+    end subroutine visit_study_lists_interface
   end interface
 
 contains
@@ -153,6 +162,12 @@ contains
       call visitor%begin_group('study', 1)
       call visitor%visit_list('acf', config%study%acf)
       call visitor%visit_list('cov', config%study%cov)
+      call visitor%visit_study_lists(config%study%lists)
+    end if
+    if (config%has_control_variate) then
+      call visitor%begin_group('control_variate', 1)
+      call visitor%visit('cell_size', config%control_variate%cell_size)
+      call visitor%visit('realizations', config%control_variate%realizations)
     end if
     call visit_output(config, visitor)
   end subroutine visit_config

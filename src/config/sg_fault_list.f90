@@ -20,6 +20,7 @@ module sg_fault_list
     type(fault_t), allocatable :: items(:)
   contains
     procedure :: add
+    procedure :: add_new
     procedure :: text => text_of_faults
   end type fault_list_t
 
@@ -46,6 +47,22 @@ contains
       this%items(this%number)%text = printable(what)
     end if
   end subroutine add
+
+  !> Adds those of `others` that are not there yet, each with `note` behind it.
+  subroutine add_new(this, others, note)
+    class(fault_list_t), intent(inout) :: this
+    type(fault_list_t), intent(in) :: others
+    character(len=*), intent(in) :: note
+    integer :: i, j
+
+    each: do i = 1, others%number
+      do j = 1, this%number
+        if (this%items(j)%line == others%items(i)%line .and. &
+          this%items(j)%text == others%items(i)%text) cycle each
+      end do
+      call this%add(others%items(i)%line, '', others%items(i)%text//note)
+    end do each
+  end subroutine add_new
 
   !> Control characters, with which a file could do things to the terminal, become '?'.
   pure function printable(text) result(clean)

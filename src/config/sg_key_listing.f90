@@ -70,7 +70,7 @@ contains
     character(len=:), allocatable :: text
     character(len=26) :: name
 
-    name = key%name
+    name = trim(key%name)
     text = '  '//name//type_text(key)
     if (key%unit /= '') text = text//', '//trim(key%unit)
     if (key%range /= '(,)') text = text//', in '//trim(key%range)

@@ -4,8 +4,8 @@
 module sg_read_config
   use sg_angles, only: DEGREE
   use sg_check_config, only: check_config
-  use sg_check_keys, only: check_keys
-  use sg_config, only: config_t, NAME_LENGTH, random_field_config_t
+  use sg_check_keys, only: check_keys, check_study_keys
+  use sg_config, only: config_t, NAME_LENGTH, random_field_config_t, study_list_t
   use sg_config_fields, only: config_visitor_t, visit_config
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
   use sg_fault_list, only: fault_list_t
@@ -15,11 +15,13 @@ module sg_read_config
   use sg_posix, only: hash_of_file, working_directory
   use sg_scan, only: scan_namelist
   use sg_schema, only: count_words, key_row, KEYS, KIND_WORD, word_at
-  use sg_text, only: lower_case
+  use sg_study, only: apply_choice, choice_of, combination_count, listed_keys, override_key, &
+    suffix_of_choice, text_of_choice, variant_t
+  use sg_text, only: lower_case, to_text
   implicit none
   private
 
-  public :: read_config
+  public :: read_config, read_variants
 
   !> Takes values from a scanned case file, or defaults where it has none.
   type, extends(config_visitor_t) :: reader_t
@@ -40,20 +42,115 @@ module sg_read_config
     procedure :: visit_word
     procedure :: visit_words
     procedure :: visit_text
+    procedure :: visit_study_lists
   end type reader_t
+
+  !> Labels get no longer than NAME_LENGTH.
+  integer, parameter :: LONGEST_SUFFIX = NAME_LENGTH - 24
+  !> More variants of a case are a mistake.
+  integer(i8), parameter :: MOST_VARIANTS = 1000_i8
 
 contains
 
-  !> Fills `config` from `text`, a whole case file. On faults `error` has code EXIT_BAD_INPUT and as
-  !> message all faults, one a line, each `file:line: &group key: what is wrong`.
+  !> Fills `config` from `text`, a whole case file; of keys that &study lists it has the first
+  !> value.
+  !> On faults `error` has code EXIT_BAD_INPUT and as message all faults, one a line, each
+  !> `file:line: &group key: what is wrong`.
   subroutine read_config(text, file_name, config, error)
     character(len=*), intent(in) :: text
     !> For messages only.
     character(len=*), intent(in) :: file_name
     type(config_t), intent(out) :: config
     type(error_t), allocatable, intent(out) :: error
-    type(reader_t) :: reader
+    type(namelist_t) :: nml
     type(fault_list_t) :: faults
+    type(study_list_t), allocatable :: lists(:)
+
+    call scan_text(text, file_name, nml, lists, faults, error)
+    if (allocated(error)) return
+    call apply_choice(lists, choice_of(lists, 1), nml)
+    call take_config(nml, file_name, config, faults)
+    if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
+  end subroutine read_config
+
+  !> The case with every combination of what &study lists beyond acf and cov (one where it lists
+  !> nothing), and behind them the twins of all on coarser cells, where &control_variate asks for
+  !> them. Faults as in `read_config`, with the combination that has them.
+  subroutine read_variants(text, file_name, variants, error)
+    character(len=*), intent(in) :: text, file_name
+    type(variant_t), allocatable, intent(out) :: variants(:)
+    type(error_t), allocatable, intent(out) :: error
+    type(namelist_t) :: nml
+    type(fault_list_t) :: faults, more
+    type(study_list_t), allocatable :: lists(:)
+    integer :: v, number
+
+    call scan_text(text, file_name, nml, lists, faults, error)
+    if (allocated(error)) return
+    call check_lists(nml, lists, faults)
+    number = 1
+    if (combination_count(lists) <= MOST_VARIANTS) number = int(combination_count(lists))
+    allocate (variants(number*merge(2, 1, nml%count('control_variate') > 0)))
+    do v = 1, size(variants)
+      associate (variant => variants(v))
+        variant%choice = choice_of(lists, mod(v - 1, number) + 1)
+        variant%varied = text_of_choice(lists, variant%choice)
+        variant%suffix = suffix_of_choice(lists, variant%choice)
+        if (v > number) variant%twin_of = v - number
+        more = fault_list_t()
+        call take_variant(nml, lists, variant, file_name, more)
+        call faults%add_new(more, note_of(variant))
+      end associate
+    end do
+    if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
+  end subroutine read_variants
+
+  subroutine take_variant(nml, lists, variant, file_name, faults)
+    type(namelist_t), intent(in) :: nml
+    type(study_list_t), intent(in) :: lists(:)
+    type(variant_t), intent(inout) :: variant
+    character(len=*), intent(in) :: file_name
+    type(fault_list_t), intent(inout) :: faults
+    type(namelist_t) :: own
+    integer :: e, g
+
+    own = nml
+    call apply_choice(lists, variant%choice, own)
+    if (variant%twin_of > 0) then
+      g = own%locate('control_variate', 1)
+      e = own%groups(g)%find('cell_size')
+      if (e == 0) return
+      if (own%groups(g)%entries(e)%number /= 1) return
+      call override_key(own, 'grid', 1, 'cell_size', own%groups(g)%entries(e)%values(1))
+    end if
+    call take_config(own, file_name, variant%config, faults)
+    associate (config => variant%config)
+      if (variant%twin_of > 0 .or. .not. config%has_control_variate) return
+      if (.not. config%control_variate%cell_size > 0.0_wp) return
+      if (config%control_variate%cell_size <= config%grid%cell_size) call faults%add( &
+        nml%line_of('control_variate', 1, 'cell_size'), '&control_variate cell_size', &
+        to_text(config%control_variate%cell_size)//' m is not above cell_size of &grid, '// &
+        to_text(config%grid%cell_size)//' m (allowed: coarser cells)')
+    end associate
+  end subroutine take_variant
+
+  !> Said behind a fault: which variant has it.
+  pure function note_of(variant) result(note)
+    type(variant_t), intent(in) :: variant
+    character(len=:), allocatable :: note
+
+    note = ''
+    if (variant%varied /= '') note = ' [with '//variant%varied//']'
+    if (variant%twin_of > 0) note = ' [as control variate]'//note
+  end function note_of
+
+  !> Text, keys that &study lists, and their values.
+  subroutine scan_text(text, file_name, nml, lists, faults, error)
+    character(len=*), intent(in) :: text, file_name
+    type(namelist_t), intent(out) :: nml
+    type(study_list_t), allocatable, intent(out) :: lists(:)
+    type(fault_list_t), intent(inout) :: faults
+    type(error_t), allocatable, intent(out) :: error
 
     if (index(text, achar(0)) > 0) then
       call raise(error, EXIT_BAD_INPUT, file_name// &
@@ -61,11 +158,54 @@ contains
         '(a case file is plain ASCII or UTF-8)', file_name)
       return
     end if
-    call scan_namelist(text, reader%nml, faults)
-    call check_keys(reader%nml, faults)
+    call scan_namelist(text, nml, faults)
+    call check_study_keys(nml, faults)
+    call listed_keys(nml, lists)
+  end subroutine scan_text
 
+  !> Values listed twice, a study that no machine finishes, and labels that would be cut off.
+  subroutine check_lists(nml, lists, faults)
+    type(namelist_t), intent(in) :: nml
+    type(study_list_t), intent(in) :: lists(:)
+    type(fault_list_t), intent(inout) :: faults
+    integer :: i, k, v
+
+    do k = 1, size(lists)
+      do i = 2, size(lists(k)%values)
+        if (all(lists(k)%values(:i - 1) /= lists(k)%values(i))) cycle
+        call faults%add(nml%line_of('study', 1, trim(lists(k)%name)), '&study '// &
+          trim(lists(k)%name), trim(lists(k)%values(i))//' is listed twice')
+        exit
+      end do
+    end do
+    if (combination_count(lists) > MOST_VARIANTS) then
+      call faults%add(nml%line_of('study', 1, ''), '&study', 'makes '// &
+        to_text(combination_count(lists))//' combinations (allowed: up to '// &
+        to_text(MOST_VARIANTS)//')')
+      return
+    end if
+    do v = 1, int(combination_count(lists))
+      if (len(suffix_of_choice(lists, choice_of(lists, v))) <= LONGEST_SUFFIX) cycle
+      call faults%add(nml%line_of('study', 1, ''), '&study', 'lists so many keys that the '// &
+        'labels of its cases get longer than '//to_text(NAME_LENGTH)//' characters')
+      return
+    end do
+  end subroutine check_lists
+
+  !> Checks the keys, fills `config` from `nml` and checks that, too.
+  subroutine take_config(nml, file_name, config, faults)
+    type(namelist_t), intent(in) :: nml
+    character(len=*), intent(in) :: file_name
+    type(config_t), intent(out) :: config
+    type(fault_list_t), intent(inout) :: faults
+    type(reader_t) :: reader
+
+    reader%nml = nml
+    call check_keys(reader%nml, faults)
     config%has_random_field = reader%nml%count('random_field') > 0
-    config%has_study = config%has_random_field .and. reader%nml%count('study') > 0
+    config%has_study = reader%nml%count('study') > 0
+    config%has_control_variate = config%has_random_field .and. &
+      reader%nml%count('control_variate') > 0
     reader%is_deterministic = .not. config%has_random_field
     allocate (config%materials(reader%nml%count('material')))
     allocate (config%bodies(reader%nml%count('body')))
@@ -75,10 +215,8 @@ contains
       config%has_random_field)))
     call visit_config(config, reader)
     call complete(config, file_name)
-
     call check_config(config, reader%nml, faults)
-    if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
-  end subroutine read_config
+  end subroutine take_config
 
   !> Values that follow from others.
   subroutine complete(config, file_name)
@@ -105,6 +243,9 @@ contains
         config%random_fields%name), index_of(config%cross_correlations(i)%between(2), &
         config%random_fields%name)]
     end do
+    if (.not. config%has_study) then
+      allocate (config%study%acf(0), config%study%cov(0), config%study%lists(0))
+    end if
     if (config%has_random_field) call complete_study(config)
   end subroutine complete
 
@@ -164,9 +305,6 @@ contains
   subroutine complete_study(config)
     type(config_t), intent(inout) :: config
 
-    if (.not. config%has_study) then
-      allocate (config%study%acf(0), config%study%cov(0))
-    end if
     associate (field => config%random_fields(1), study => config%study)
       if (size(study%acf) == 0) then
         study%acf = [field%acf]
@@ -361,4 +499,11 @@ contains
     value = ''
     if (size(values) > 0) value = trim(values(1)%text)
   end subroutine visit_text
+
+  subroutine visit_study_lists(this, lists)
+    class(reader_t), intent(inout) :: this
+    type(study_list_t), allocatable, intent(inout) :: lists(:)
+
+    call listed_keys(this%nml, lists)
+  end subroutine visit_study_lists
 end module sg_read_config

@@ -2,14 +2,14 @@
 !> two such files.
 module sg_resolved
   use sg_check_keys, only: why_not
-  use sg_config, only: config_t, NAME_LENGTH
+  use sg_config, only: config_t, NAME_LENGTH, study_list_t
   use sg_config_fields, only: config_visitor_t, visit_config
   use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
   use sg_namelist, only: namelist_t, nml_entry_t
   use sg_number_text, only: range_holds
   use sg_read_config, only: read_config
-  use sg_schema, only: key_row, KEYS, KIND_INTEGER, KIND_REAL
+  use sg_schema, only: key_row, KEYS, KIND_INTEGER, KIND_REAL, KIND_WORD
   use sg_text, only: to_text
   implicit none
   private
@@ -33,6 +33,7 @@ module sg_resolved
     procedure :: visit_word
     procedure :: visit_words
     procedure :: visit_text
+    procedure :: visit_study_lists
   end type writer_t
 
 contains
@@ -71,13 +72,23 @@ contains
     do g = 1, nml%number
       associate (group => nml%groups(g))
         do e = 1, group%number
-          if (.not. KEYS(key_row(group%name, group%entries(e)%key))%identity) cycle
+          if (.not. matters(group%name, group%entries(e)%key)) cycle
           text = text//group%name//'('//to_text(occurrence(nml, g))//')%'// &
             group%entries(e)%key//' = '//values_text(group%entries(e))//new_line('a')
         end do
       end associate
     end do
   end function identity_text
+
+  !> Whether results depend on a key; on one of another group that &study lists they do.
+  pure logical function matters(group, key)
+    character(len=*), intent(in) :: group, key
+    integer :: row
+
+    row = key_row(group, key)
+    matters = .true.
+    if (row > 0) matters = KEYS(row)%identity
+  end function matters
 
   pure integer function occurrence(nml, g)
     type(namelist_t), intent(in) :: nml
@@ -138,7 +149,7 @@ contains
       place = '&'//group%name
       if (here%count(group%name) > 1) place = place//' '//to_text(occurrence(here, g))
       do e = 1, group%number
-        if (.not. KEYS(key_row(group%name, group%entries(e)%key))%identity) cycle
+        if (.not. matters(group%name, group%entries(e)%key)) cycle
         mine = values_text(group%entries(e))
         yours = '(not set)'
         f = 0
@@ -332,4 +343,20 @@ contains
 
     call this%take_one(key, value)
   end subroutine visit_text
+
+  subroutine visit_study_lists(this, lists)
+    class(writer_t), intent(inout) :: this
+    type(study_list_t), allocatable, intent(inout) :: lists(:)
+    integer :: i, k
+
+    associate (group => this%nml%groups(this%nml%number))
+      do k = 1, size(lists)
+        call group%add_entry(trim(lists(k)%name), 0)
+        do i = 1, size(lists(k)%values)
+          call group%entries(group%number)%add_value(trim(lists(k)%values(i)), &
+            KEYS(lists(k)%row)%kind == KIND_WORD, 0)
+        end do
+      end do
+    end associate
+  end subroutine visit_study_lists
 end module sg_resolved

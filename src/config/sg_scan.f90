@@ -3,7 +3,8 @@
 !>
 !> Understood: `&group`, `key = value, ...`, `/` or `&end`, comments from `!` on, text in single or
 !> double quotes (doubled inside), repeat counts (`3*1.0`), values on several lines, several groups
-!> on a line, names in any case, tabs, CRLF and a byte order mark.
+!> on a line, names in any case, tabs, CRLF and a byte order mark; in &study also keys of other
+!> groups, as `grid%x_max` and `body(2)%height`.
 module sg_scan
   use sg_fault_list, only: fault_list_t, quoted
   use sg_kinds, only: i8
@@ -178,9 +179,11 @@ contains
     type(namelist_t), intent(inout) :: nml
     type(token_t) :: token
     character(len=:), allocatable :: key
-    logical :: spoilt
+    logical :: spoilt, is_name, is_study
 
     key = lower_case(name%text)
+    is_study = nml%groups(nml%number)%name == 'study'
+    if (is_study) call take_group_number(scanner, key)
     scanner%where = scanner%where//' '//key
     spoilt = name%spoilt
     call scanner%next(token)
@@ -191,7 +194,12 @@ contains
       call scanner%peek(token)
       if (token%kind == EQUALS) call scanner%next(token)
     end if
-    if (.not. spoilt .and. verify(key, NAME_CHARACTERS) > 0) then
+    if (is_study) then
+      is_name = verify(key, NAME_CHARACTERS//'%()') == 0
+    else
+      is_name = verify(key, NAME_CHARACTERS) == 0
+    end if
+    if (.not. spoilt .and. .not. is_name) then
       spoilt = .true.
       call scanner%faults%add(name%line, scanner%where, 'this is no name of a key (letters, '// &
         'digits and _)')
@@ -199,6 +207,27 @@ contains
     call nml%groups(nml%number)%add_entry(key, name%line)
     call scan_values(scanner, nml, spoilt)
   end subroutine scan_key
+
+  !> In &study a key may be that of another group, `body(2)%height`: takes what follows `body`.
+  subroutine take_group_number(scanner, key)
+    type(scanner_t), intent(inout) :: scanner
+    character(len=:), allocatable, intent(inout) :: key
+    type(token_t) :: number, rest
+    integer :: position, line
+
+    position = scanner%position
+    line = scanner%line
+    call scanner%next(number)
+    if (number%kind == BRACKET) then
+      call scanner%next(rest)
+      if (rest%kind == WORD .and. index(rest%text, '%') == 1) then
+        key = key//number%text//lower_case(rest%text)
+        return
+      end if
+    end if
+    scanner%position = position
+    scanner%line = line
+  end subroutine take_group_number
 
   !> Reads values into the newest key of the newest group, up to the next key or the end of the
   !> group.

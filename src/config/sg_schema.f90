@@ -3,7 +3,7 @@
 !>
 !> Words in `choices` are accepted; words in `later` are known, but belong to a later version and
 !> are refused. A new key needs a row here, a line in `sg_config_fields` and a component of
-!> `config_t`.
+!> `config_t`. Any key of one number or word may also be listed in &study (sg_study_keys).
 module sg_schema
   implicit none
   private
@@ -27,7 +27,7 @@ module sg_schema
 
   type :: group_t
     character(len=20) :: name
-    character(len=128) :: meaning
+    character(len=240) :: meaning
     logical :: required = .false.
     logical :: repeatable = .false.
     !> Group without which this one makes no sense.
@@ -38,7 +38,7 @@ module sg_schema
 
   type :: key_t
     character(len=20) :: group
-    character(len=24) :: name
+    character(len=40) :: name
     integer :: kind
     character(len=8) :: unit = ''
     !> Value of a key that is not given, as in a case file but without quotes; lists with blanks.
@@ -84,7 +84,11 @@ module sg_schema
     repeatable=.true., needs='random_field', in_example=.false.), &
     group_t('monte_carlo', 'How many realizations, and when a run counts as good'), &
     group_t('study', 'Every combination of the listed values is a case, with the same random '// &
-    'numbers in all', needs='random_field'), &
+    'numbers in all. Beside acf and cov, any key of one number or word may be listed: damping '// &
+    '= 0.4, 0.7, or body(2)%height where its name alone is not clear'), &
+    group_t('control_variate', 'A cheap twin of every study case on coarser cells, with the '// &
+    'same random numbers: control variate of the two-level estimator', needs='random_field', &
+    in_example=.false.), &
     group_t('output', 'Where results go, and how many')]
 
   type(key_t), parameter :: CASE_KEYS(*) = [ &
@@ -369,9 +373,19 @@ module sg_schema
 
   type(key_t), parameter :: STUDY_KEYS(*) = [ &
     key_t('study', 'acf', KIND_WORD, example='snx sqx', size=ANY_NUMBER, &
-    choices=STUDY_ACFS, meaning='Autocorrelation functions of the first field'), &
+    choices=STUDY_ACFS, needs='random_field', meaning='Autocorrelation functions of the first '// &
+    'field'), &
     key_t('study', 'cov', KIND_REAL, unit='1', example='0.05 0.10', range='(0,2]', &
-    size=ANY_NUMBER, meaning='Coefficients of variation of the first field')]
+    size=ANY_NUMBER, needs='random_field', meaning='Coefficients of variation of the first '// &
+    'field')]
+
+  type(key_t), parameter :: CONTROL_VARIATE_KEYS(*) = [ &
+    key_t('control_variate', 'cell_size', KIND_REAL, unit='m', example='0.25', range='(0,)', &
+    required=.true., meaning='Side of a cell of the twins, above that of &grid. Their fields '// &
+    'are those of the cases, averaged over the domains of their points'), &
+    key_t('control_variate', 'realizations', KIND_INTEGER, example='800', &
+    range='[1,1000000000]', required=.true., identity=.false., meaning='Realizations of each '// &
+    'twin, at least as many as of the case; sgimp-post allocate says how many pay')]
 
   type(key_t), parameter :: OUTPUT_KEYS(*) = [ &
     key_t('output', 'directory', KIND_TEXT, default='runs/<name>', identity=.false., &
@@ -389,7 +403,7 @@ module sg_schema
 
   type(key_t), parameter :: KEYS(*) = [CASE_KEYS, GRID_KEYS, MATERIAL_KEYS, BODY_KEYS, &
     BOUNDARY_KEYS, LOADING_KEYS, SOLVER_KEYS, RANDOM_FIELD_KEYS, CROSS_CORRELATION_KEYS, &
-    MONTE_CARLO_KEYS, STUDY_KEYS, OUTPUT_KEYS]
+    MONTE_CARLO_KEYS, STUDY_KEYS, CONTROL_VARIATE_KEYS, OUTPUT_KEYS]
 
 contains
 

@@ -3,35 +3,31 @@
 module sg_collapse
   use sg_config, only: config_t
   use sg_errors, only: error_t
-  use sg_field_properties, only: compose_properties, points_of_materials, refuse_hidden, &
-    units_of
-  use sg_field_record, only: field_file_t, field_record_t, made_by_t
+  use sg_ground, only: build_grounds, ground_t
   use sg_kinds, only: i8, wp
   use sg_materials, only: MODEL_MOHR_COULOMB
   use sg_member_model, only: member_model_t
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
-  use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, FIELD_MAX, FIELD_MEAN, FIELD_MIN, outcome_t, &
-    reset_outcome, STATUS_ABANDONED, STATUS_FIELD_FAILED, STATUS_OK, STATUS_TIME_LIMIT, &
-    status_text, STEPS
-  use sg_posix, only: write_file
-  use sg_resolved, only: resolved_text
-  use sg_snapshot, only: snapshot_name
+  use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, FIELD_MAX, FIELD_MEAN, FIELD_MIN, &
+    outcome_t, reset_outcome, STATUS_ABANDONED, STATUS_FIELD_FAILED, STATUS_OK, &
+    STATUS_TIME_LIMIT, status_text, STEPS
   use sg_philox, only: fill_uniform, NOISE_STREAM
   use sg_plan, only: plan_t
+  use sg_posix, only: write_file
   use sg_property, only: PROPERTY_FRICTION_ANGLE
-  use sg_random_field, only: field_points_t
-  use sg_random_fields, only: field_values_t, follows_study, random_fields_t, &
-    refuse_changed_files
+  use sg_random_fields, only: field_values_t
   use sg_recorder, only: recorder_t
-  use sg_scene, only: build_scene, scene_t
+  use sg_resolved, only: resolved_text
   use sg_simulate, only: simulate
+  use sg_snapshot, only: snapshot_name
+  use sg_study, only: variant_t
   use sg_text, only: to_text
   use sg_variation, only: variation_t
   implicit none
   private
 
-  public :: collapse_model_t, prepare_fields
+  public :: collapse_model_t
 
   !> Homogeneous members beyond the first: CFL number within +-20 %, lines of the grid shifted by up
   !> to a cell at the toe, properties within 1e-6. None of it means anything physically; the spread
@@ -40,13 +36,10 @@ module sg_collapse
   real(wp), parameter :: PROPERTY_SPREAD = 1.0e-6_wp
 
   type, extends(member_model_t) :: collapse_model_t
-    type(config_t) :: config
     type(plan_t) :: plan
-    type(scene_t) :: scene
-    !> The points of each material, and the fields for each ACF of the study; the coefficient of
-    !> variation is set for each member.
-    type(field_points_t), allocatable :: points(:)
-    type(random_fields_t), allocatable :: fields(:)
+    !> One for each variant of the case; there are several in a study of
+    !> other keys than acf and cov, and where there are control variates.
+    type(ground_t), allocatable :: grounds(:)
     !> Record every member, with snapshots at their interval (replays).
     logical :: record_all = .false.
     !> Record none, whatever the configuration says (replays without snapshots).
@@ -54,149 +47,42 @@ module sg_collapse
   contains
     procedure :: init => init_collapse
     procedure :: run => run_collapse
-    procedure :: field_method
-    procedure :: field_records
     procedure :: make_fields
-    procedure, private :: choose_fields
+    procedure :: profile_size
+    procedure :: field_ground
     procedure, private :: vary_homogeneous
     procedure, private :: vary_by_field
-    procedure, private :: is_recorded
+    procedure, private :: record_member
     procedure, private :: keep_capsule
   end type collapse_model_t
 
 contains
 
-  !> Builds what all members share: the scene and the factors of the fields. Nothing random happens
-  !> here.
-  subroutine init_collapse(this, config, plan, error)
+  !> Builds what all members share: scenes and the factors of the fields.
+  subroutine init_collapse(this, variants, plan, error)
     class(collapse_model_t), intent(inout) :: this
-    type(config_t), intent(in) :: config
+    type(variant_t), intent(in) :: variants(:)
     type(plan_t), intent(in) :: plan
     type(error_t), allocatable, intent(out) :: error
-    integer :: k
 
-    this%config = config
     this%plan = plan
-    call build_scene(config, this%scene, error)
-    if (allocated(error)) return
-    if (.not. config%has_random_field) return
-    this%points = points_of_materials(this%scene)
-    call prepare_fields(config, this%points, this%fields, error)
-    do k = 1, size(config%study%acf)
-      if (allocated(error)) return
-      call this%fields(k)%build(error)
-    end do
+    call build_grounds(variants, this%grounds, error)
   end subroutine init_collapse
 
-  !> The fields for each ACF of the study, without their factors; what is wrong with them in any
-  !> case is told here, and not by members that fail.
-  subroutine prepare_fields(config, points, fields, error)
-    type(config_t), intent(in) :: config
-    !> Of each material.
-    type(field_points_t), intent(in) :: points(:)
-    type(random_fields_t), allocatable, intent(out) :: fields(:)
-    type(error_t), allocatable, intent(out) :: error
-    integer :: j, k
-
-    call refuse_changed_files(config, error)
-    if (allocated(error)) return
-    allocate (fields(size(config%study%acf)))
-    do k = 1, size(fields)
-      call fields(k)%prepare(config, trim(config%study%acf(k)), config%study%cov(1), points, error)
-      if (.not. allocated(error)) call refuse_hidden(fields(k)%fields, error)
-      do j = size(config%study%cov), 1, -1
-        if (.not. allocated(error)) call fields(k)%set_cov(config%study%cov(j), error)
-      end do
-      if (.not. allocated(error)) call open_files(fields(k), config%monte_carlo%realizations, &
-        error)
-      if (allocated(error)) return
-    end do
-  end subroutine prepare_fields
-
-  !> How the fields are sampled, with what was conceded for each ACF; empty without a field.
-  function field_method(this) result(text)
+  !> Columns of the profile of a case.
+  pure integer function profile_size(this, case_index)
     class(collapse_model_t), intent(in) :: this
-    character(len=:), allocatable :: text
-    integer :: k
+    integer, intent(in) :: case_index
 
-    text = ''
-    if (.not. allocated(this%fields)) return
-    text = this%fields(1)%describe()
-    do k = 2, size(this%fields)
-      if (this%fields(k)%describe() /= this%fields(1)%describe()) text = text//'; '// &
-        trim(this%config%study%acf(k))//': '//this%fields(k)%describe()
-    end do
-  end function field_method
+    profile_size = size(this%grounds(this%plan%cases(case_index)%variant)%scene%profile_x)
+  end function profile_size
 
-  !> The fields, for files; size 0 without one.
-  function field_records(this) result(records)
+  !> Position of the ground whose fields the first variant has.
+  pure integer function field_ground(this)
     class(collapse_model_t), intent(in) :: this
-    type(field_record_t), allocatable :: records(:)
-    integer :: j, k
 
-    if (.not. allocated(this%fields)) then
-      allocate (records(0))
-      return
-    end if
-    allocate (records(size(this%fields(1)%fields)))
-    do k = 1, size(records)
-      associate (r => records(k), field => this%fields(1)%fields(k))
-        r%index = k
-        r%name = trim(field%config%name)
-        r%property = trim(field%config%property)
-        r%material = trim(field%config%material)
-        r%units = units_of(r%property)
-        r%x = field%x
-        r%y = field%y
-        r%width = this%points(field%config%material_index)%width(field%points)
-        r%height = this%points(field%config%material_index)%height(field%points)
-        r%mean = field%mean
-        r%sd = field%sd
-        r%data = this%fields(1)%data%of_field(k)
-        allocate (r%made_by(merge(size(this%fields), 1, follows_study(this%config, k))))
-        do j = 1, size(r%made_by)
-          r%made_by(j) = way_of(this%fields(j), k)
-        end do
-      end associate
-    end do
-  end function field_records
-
-  !> How field `k` is made.
-  function way_of(fields, k) result(way)
-    type(random_fields_t), intent(in) :: fields
-    integer, intent(in) :: k
-    type(made_by_t) :: way
-
-    way%acf = trim(fields%fields(k)%correlation%acf%name)
-    way%method = 'file'
-    allocate (way%jitters(0))
-    if (fields%sampler_of(k) == 0) return
-    associate (sampler => fields%samplers(fields%sampler_of(k))%sampler)
-      way%method = sampler%method
-      way%jitters = sampler%jitters
-      way%ring = sampler%ring
-    end associate
-  end function way_of
-
-  !> Opens the files of the fields that are not sampled.
-  subroutine open_files(fields, realizations, error)
-    type(random_fields_t), intent(inout) :: fields
-    integer, intent(in) :: realizations
-    type(error_t), allocatable, intent(out) :: error
-    type(field_file_t), allocatable :: file
-    integer :: k
-
-    do k = 1, size(fields%fields)
-      associate (field => fields%fields(k))
-        if (field%config%file == '') cycle
-        allocate (file)
-        call file%open_fields(field%config%file, trim(field%config%name), field%x, field%y, &
-          realizations, error)
-        if (allocated(error)) return
-        call move_alloc(file, fields%supplies(k)%supply)
-      end associate
-    end do
-  end subroutine open_files
+    field_ground = max(1, this%grounds(1)%source)
+  end function field_ground
 
   !> One member; see member_model_t.
   subroutine run_collapse(this, case_index, id, monitor, outcome)
@@ -206,14 +92,13 @@ contains
     class(monitor_t), intent(inout) :: monitor
     type(outcome_t), intent(out) :: outcome
     type(variation_t) :: variation
-    type(recorder_t) :: recorder
     type(blind_observer_t) :: nobody
     type(error_t), allocatable :: error
     type(field_values_t), allocatable :: values(:)
 
-    call reset_outcome(outcome, case_index, id, size(this%scene%profile_x))
+    call reset_outcome(outcome, case_index, id, this%profile_size(case_index))
     if (this%plan%cases(case_index)%is_homogeneous) then
-      call this%vary_homogeneous(id, variation, values)
+      call this%vary_homogeneous(case_index, id, variation, values)
     else
       call this%vary_by_field(case_index, id, variation, values, error)
     end if
@@ -222,28 +107,48 @@ contains
       outcome%reason = error%message
       return
     end if
-    if (this%is_recorded(id)) then
-      associate (output => this%config%output)
-        call recorder%open(output%directory, 'snapshots', &
-          trim(this%plan%cases(case_index)%label), id, output%snapshot_interval, &
-          output%history_interval, error)
-      end associate
-      if (allocated(error)) then
-        call simulate(this%config, this%scene, variation, monitor, nobody, outcome)
+    associate (ground => this%grounds(this%plan%cases(case_index)%variant))
+      if (is_recorded(this, ground%config, id)) then
+        call this%record_member(case_index, id, variation, monitor, outcome)
       else
-        call simulate(this%config, this%scene, variation, monitor, recorder, outcome)
-        if (outcome%status /= STATUS_ABANDONED) call recorder%close(error)
+        call simulate(ground%config, ground%scene, variation, monitor, nobody, outcome)
       end if
-      if (allocated(error) .and. outcome%status == STATUS_OK) outcome%reason = &
-        'snapshots not written: '//error%message
-    else
-      call simulate(this%config, this%scene, variation, monitor, nobody, outcome)
-    end if
+    end associate
     if (outcome%values(FAILURE_STEP) > 0.0_wp .and. .not. this%record_nothing) then
       call this%keep_capsule(case_index, id, variation, monitor, outcome)
     end if
     if (allocated(values)) call describe_field(values(1), outcome)
   end subroutine run_collapse
+
+  !> A member whose states and history are written. If they cannot be, the member counts all the
+  !> same, and says so.
+  subroutine record_member(this, case_index, id, variation, monitor, outcome)
+    class(collapse_model_t), intent(in) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+    type(variation_t), intent(in) :: variation
+    class(monitor_t), intent(inout) :: monitor
+    type(outcome_t), intent(inout) :: outcome
+    type(recorder_t) :: recorder
+    type(blind_observer_t) :: nobody
+    type(error_t), allocatable :: error
+
+    associate (one => this%plan%cases(case_index), &
+      ground => this%grounds(this%plan%cases(case_index)%variant))
+      associate (output => ground%config%output)
+        call recorder%open(output%directory, 'snapshots', trim(one%label), id, &
+          output%snapshot_interval, output%history_interval, error)
+      end associate
+      if (allocated(error)) then
+        call simulate(ground%config, ground%scene, variation, monitor, nobody, outcome)
+      else
+        call simulate(ground%config, ground%scene, variation, monitor, recorder, outcome)
+        if (outcome%status /= STATUS_ABANDONED) call recorder%close(error)
+      end if
+    end associate
+    if (allocated(error) .and. outcome%status == STATUS_OK) outcome%reason = &
+      'snapshots not written: '//error%message
+  end subroutine record_member
 
   !> What a failed member leaves in DIR/failures: its first and its last good state (the step before
   !> the failure, computed again; of the relaxation if it failed there), and a case file that
@@ -263,7 +168,8 @@ contains
 
     if (outcome%status == STATUS_TIME_LIMIT) return
     label = trim(this%plan%cases(case_index)%label)
-    associate (output => this%config%output)
+    associate (ground => this%grounds(this%plan%cases(case_index)%variant), &
+      output => this%grounds(1)%config%output)
       path = trim(output%directory)//'/failures/'//snapshot_name(label, id)
       call recorder%open(output%directory, 'failures', label, id, 0.0_wp, 0.0_wp, error)
       if (.not. allocated(error)) then
@@ -273,8 +179,8 @@ contains
         else
           shortened%last_relaxation_step = nint(outcome%values(FAILURE_STEP)) - 1
         end if
-        call reset_outcome(again, case_index, id, size(this%scene%profile_x))
-        call simulate(this%config, this%scene, shortened, monitor, recorder, again)
+        call reset_outcome(again, case_index, id, this%profile_size(case_index))
+        call simulate(ground%config, ground%scene, shortened, monitor, recorder, again)
         if (again%status == STATUS_ABANDONED) return
         call recorder%close(error)
       end if
@@ -282,7 +188,7 @@ contains
         label//' failed ('//status_text(outcome%status)//') in step '// &
         to_text(nint(outcome%values(FAILURE_STEP)))//': '//outcome%reason//new_line('a')// &
         '! Replay: sgimp THIS_FILE --realization '//to_text(id)//' --study-case '//label// &
-        ' --snapshots --output DIR'//new_line('a')//resolved_text(this%config), error)
+        ' --snapshots --output DIR'//new_line('a')//resolved_text(this%grounds(1)%config), error)
     end associate
     if (allocated(error)) outcome%reason = outcome%reason//' (capsule not written: '// &
       error%message//')'
@@ -301,40 +207,41 @@ contains
 
   !> Member 1 is nominal, the others differ by what means nothing. With random fields, properties
   !> have their means.
-  subroutine vary_homogeneous(this, id, variation, values)
+  subroutine vary_homogeneous(this, case_index, id, variation, values)
     class(collapse_model_t), intent(in) :: this
+    integer, intent(in) :: case_index
     integer(i8), intent(in) :: id
     type(variation_t), intent(inout) :: variation
     !> Not allocated without a random field.
     type(field_values_t), allocatable, intent(out) :: values(:)
     real(wp) :: u(3), strength
-    integer :: k, material
+    integer :: material
 
     strength = 1.0_wp
-    if (id > 1) then
-      call fill_uniform(this%config%monte_carlo%seed, NOISE_STREAM, id, 0_i8, u)
-      variation%step_factor = 1.0_wp + STEP_SPREAD*(2.0_wp*u(1) - 1.0_wp)
-      if (this%scene%is_clear_of_far_walls) variation%cell_stretch = u(2) &
-        *this%config%grid%cell_size/(this%scene%extent(2) - this%config%grid%x_min)
-      strength = 1.0_wp + PROPERTY_SPREAD*(2.0_wp*u(3) - 1.0_wp)
-    end if
-    if (this%config%has_random_field) then
-      allocate (values(size(this%fields(1)%fields)))
-      do k = 1, size(values)
-        values(k)%values = strength*this%fields(1)%fields(k)%mean
-      end do
-      call compose_properties(this%config, this%fields(1)%fields, values, this%points, &
-        variation%properties)
-      return
-    end if
-    material = this%config%bodies(1)%material_index
-    if (id == 1 .or. this%scene%materials(material)%model /= MODEL_MOHR_COULOMB) return
-    allocate (variation%properties(1))
-    associate (one => variation%properties(1))
-      one%property = PROPERTY_FRICTION_ANGLE
-      one%material = material
-      allocate (one%values(this%scene%point_count(material)), &
-        source=strength*this%scene%materials(material)%friction_angle)
+    associate (ground => this%grounds(this%plan%cases(case_index)%variant))
+      associate (config => ground%config, scene => ground%scene)
+        if (id > 1) then
+          call fill_uniform(config%monte_carlo%seed, NOISE_STREAM, id, 0_i8, u)
+          variation%step_factor = 1.0_wp + STEP_SPREAD*(2.0_wp*u(1) - 1.0_wp)
+          if (scene%is_clear_of_far_walls) variation%cell_stretch = u(2) &
+            *config%grid%cell_size/(scene%extent(2) - config%grid%x_min)
+          strength = 1.0_wp + PROPERTY_SPREAD*(2.0_wp*u(3) - 1.0_wp)
+        end if
+        if (config%has_random_field) then
+          allocate (values, source=ground%mean_properties(strength))
+          allocate (variation%properties, source=ground%properties_of(values))
+          return
+        end if
+        material = config%bodies(1)%material_index
+        if (id == 1 .or. scene%materials(material)%model /= MODEL_MOHR_COULOMB) return
+        allocate (variation%properties(1))
+        associate (one => variation%properties(1))
+          one%property = PROPERTY_FRICTION_ANGLE
+          one%material = material
+          allocate (one%values(scene%point_count(material)), &
+            source=strength*scene%materials(material)%friction_angle)
+        end associate
+      end associate
     end associate
   end subroutine vary_homogeneous
 
@@ -346,13 +253,13 @@ contains
     type(variation_t), intent(inout) :: variation
     type(field_values_t), allocatable, intent(out) :: values(:)
     type(error_t), allocatable, intent(out) :: error
-    integer :: k
+    type(field_values_t), allocatable :: block(:, :)
 
-    call this%choose_fields(case_index, k, error)
-    if (.not. allocated(error)) call this%fields(k)%realize(id, values, error)
+    call this%make_fields(case_index, id, 1, block, error)
     if (allocated(error)) return
-    call compose_properties(this%config, this%fields(1)%fields, values, this%points, &
-      variation%properties)
+    values = block(:, 1)
+    allocate (variation%properties, source=this%grounds(this%plan%cases(case_index)%variant) &
+      %properties_of(values))
   end subroutine vary_by_field
 
   !> The fields of `count` realizations of a study case from `first` on, [fields, count].
@@ -362,37 +269,33 @@ contains
     integer(i8), intent(in) :: first
     type(field_values_t), allocatable, intent(out) :: values(:, :)
     type(error_t), allocatable, intent(out) :: error
-    integer :: k
-
-    call this%choose_fields(case_index, k, error)
-    if (.not. allocated(error)) call this%fields(k)%realize_block(first, count, values, error)
-  end subroutine make_fields
-
-  !> The fields of a study case, in place `k`, with the laws of its coefficient of variation.
-  subroutine choose_fields(this, case_index, k, error)
-    class(collapse_model_t), intent(inout) :: this
-    integer, intent(in) :: case_index
-    integer, intent(out) :: k
-    type(error_t), allocatable, intent(out) :: error
+    integer :: k, m, source
 
     associate (one => this%plan%cases(case_index))
-      do k = 1, size(this%fields)
-        if (this%config%study%acf(k) == one%acf) exit
+      source = this%grounds(one%variant)%source
+      k = this%grounds(source)%acf_index(trim(one%acf))
+      associate (fields => this%grounds(source)%fields(k))
+        call fields%set_cov(one%cov, error)
+        if (.not. allocated(error)) call fields%realize_block(first, count, values, error)
+      end associate
+      if (allocated(error)) return
+      do m = 1, count
+        call this%grounds(one%variant)%restrict(values(:, m))
       end do
-      call this%fields(k)%set_cov(one%cov, error)
     end associate
-  end subroutine choose_fields
+  end subroutine make_fields
 
   !> Members that were asked for; without a random field the nominal run, if anything is to be
   !> recorded at all.
-  pure function is_recorded(this, id) result(recorded)
+  pure function is_recorded(this, config, id) result(recorded)
     class(collapse_model_t), intent(in) :: this
+    type(config_t), intent(in) :: config
     integer(i8), intent(in) :: id
     logical :: recorded
 
-    associate (output => this%config%output)
+    associate (output => config%output)
       recorded = this%record_all .or. any(output%snapshot_members == id)
-      if (.not. this%config%has_random_field .and. id == 1) then
+      if (.not. config%has_random_field .and. id == 1) then
         recorded = recorded .or. output%snapshot_interval > 0.0_wp &
           .or. output%history_interval > 0.0_wp
       end if

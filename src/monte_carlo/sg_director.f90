@@ -46,6 +46,8 @@ module sg_director
     procedure :: write_results
     procedure :: sync_journal
     procedure :: count_members
+    procedure :: prefix_of
+    procedure :: statistics_of
   end type ensemble_director_t
 
   !> Between two looks at the file STOP, in s.
@@ -150,7 +152,7 @@ contains
     best = 1
     most = 0
     do i = 1, size(this%results)
-      n = contiguous_prefix(this%results(i)%present)
+      n = this%prefix_of(i)
       if (n == 0 .or. n < most) cycle
       if (n == most .and. .not. this%results(best)%is_homogeneous) cycle
       best = i
@@ -158,14 +160,36 @@ contains
     end do
     text = ''
     if (most == 0) return
-    associate (r => this%results(best))
-      s = describe(r%values(RUNOUT_Q995, :most), r%status(:most) == STATUS_OK)
-      if (s%count == 0) return
-      text = ', runout_q995 of '//r%label//' '//to_text(s%mean, 5)
-      if (s%count > 1) text = text//' +- '//to_text(s%half_width, 2)
-      text = text//' m (95 %, n='//to_text(s%count)//')'
-    end associate
+    s = this%statistics_of(best)
+    if (s%count == 0) return
+    text = ', runout_q995 of '//this%results(best)%label//' '//to_text(s%mean, 5)
+    if (s%count > 1) text = text//' +- '//to_text(s%half_width, 2)
+    text = text//' m (95 %, n='//to_text(s%count)//')'
   end function running_text
+
+  !> Members of a case without a gap, from the first that this run is to compute.
+  pure integer function prefix_of(this, case_index)
+    class(ensemble_director_t), intent(in) :: this
+    integer, intent(in) :: case_index
+
+    associate (range => this%plan%range_of(case_index))
+      prefix_of = contiguous_prefix(this%results(case_index)%present(range(1):range(2)))
+    end associate
+  end function prefix_of
+
+  !> Of the 99.5 % runout of these members.
+  pure function statistics_of(this, case_index) result(statistics)
+    class(ensemble_director_t), intent(in) :: this
+    integer, intent(in) :: case_index
+    type(sample_statistics_t) :: statistics
+    integer(i8) :: first, last
+
+    associate (r => this%results(case_index), range => this%plan%range_of(case_index))
+      first = range(1)
+      last = first + this%prefix_of(case_index) - 1
+      statistics = describe(r%values(RUNOUT_Q995, first:last), r%status(first:last) == STATUS_OK)
+    end associate
+  end function statistics_of
 
   !> Puts on disk, at once, all members that came in since the last time. Nothing is told of a
   !> member, in a line of progress or in ensemble.h5, before.
@@ -192,7 +216,7 @@ contains
     this%write_cost = this%last_write - begin
   end subroutine write_results
 
-  !> Members of the plan that are there, and how many of them failed.
+  !> Members that this run is to compute and that are there, and how many of them failed.
   subroutine count_members(this, done, failed)
     class(ensemble_director_t), intent(in) :: this
     integer(i8), intent(out) :: done, failed
@@ -201,9 +225,10 @@ contains
     done = 0
     failed = 0
     do i = 1, size(this%results)
-      associate (r => this%results(i))
-        done = done + count(r%present, kind=i8)
-        failed = failed + count(pack(r%status, r%present) /= STATUS_OK, kind=i8)
+      associate (r => this%results(i), range => this%plan%range_of(i))
+        done = done + count(r%present(range(1):range(2)), kind=i8)
+        failed = failed + count(r%present(range(1):range(2)) .and. &
+          r%status(range(1):range(2)) /= STATUS_OK, kind=i8)
       end associate
     end do
   end subroutine count_members

@@ -3,20 +3,20 @@ module sg_driver
   use sg_comm, only: comm_t
   use sg_config, only: config_t
   use sg_director, only: ensemble_director_t
-  use sg_ensemble, only: ENSEMBLE_NAME
+  use sg_ensemble, only: case_geometry_t, ENSEMBLE_NAME
   use sg_errors, only: error_t, EXIT_BAD_INPUT, EXIT_OK, EXIT_STOPPED_EARLY, &
     EXIT_TOO_MANY_FAILED, raise
   use sg_field_record, only: field_record_t
   use sg_journal, only: damage_t
   use sg_kinds, only: i8, wp
   use sg_member_model, only: member_model_t
-  use sg_outcome, only: outcome_t, RUNOUT_Q995, STATUS_OK
+  use sg_outcome, only: outcome_t
   use sg_plan, only: plan_t
   use sg_posix, only: catch_signals, hash_text, host_name, make_directory, remove_file, &
     remove_files, utc_time, write_file
   use sg_progress, only: id_list, json_text
   use sg_scheduler, only: run_members
-  use sg_statistics, only: contiguous_prefix, describe, sample_statistics_t
+  use sg_statistics, only: sample_statistics_t
   use sg_text, only: text_of_duration, to_text
   use sg_timer, only: wall_seconds
   implicit none
@@ -40,18 +40,14 @@ module sg_driver
   type :: run_request_t
     type(config_t) :: config
     type(plan_t) :: plan
-    !> Cell centres of the columns of the profile, in m; `outcome%height` has the same size.
-    real(wp), allocatable :: profile_x(:)
-    !> The case file verbatim, and every key resolved.
-    character(len=:), allocatable :: case_text, resolved
+    !> Of each case of the plan.
+    type(case_geometry_t), allocatable :: geometries(:)
+    !> The case file verbatim, every key resolved, and those that results depend on.
+    character(len=:), allocatable :: case_text, resolved, identity
     !> How the fields are sampled, and the jitter that their factors needed: one line, may be empty.
     character(len=:), allocatable :: field_method
     !> The fields themselves; size 0 or not allocated without any.
     type(field_record_t), allocatable :: fields(:)
-    !> Initial toe, from which runouts are measured, and extent of the body, and the spacing of
-    !> points, in m.
-    real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
-    real(wp) :: point_spacing = 0.0_wp
     !> Throw away what the directory holds of earlier runs.
     logical :: overwrite = .false.
     !> Wall clock limit of the whole run in s, counted from the start of the program; 0 = none.
@@ -164,32 +160,31 @@ contains
       record%seed = config%monte_carlo%seed
       record%ranks = ranks
       record%realizations = config%monte_carlo%realizations
-      record%toe = request%toe
-      record%initial_height = request%initial_height
-      record%initial_width = request%initial_width
-      record%point_spacing = request%point_spacing
-      record%x_min = config%grid%x_min
-      record%x_max = config%grid%x_max
-      record%y_min = config%grid%y_min
-      record%y_max = config%grid%y_max
-      record%cell_size = config%grid%cell_size
-      record%profile_x = request%profile_x
+      record%identity = ''
+      if (allocated(request%identity)) record%identity = request%identity
+      record%members = ''
+      if (request%plan%is_part()) record%members = to_text(request%plan%first)//'-'// &
+        to_text(request%plan%last)
     end associate
     allocate (director%results(size(request%plan%cases)))
     do i = 1, size(director%results)
       associate (r => director%results(i), c => request%plan%cases(i))
-        call r%init(c%member_count, size(request%profile_x))
+        call r%init(c%member_count, request%geometries(i))
         r%label = trim(c%label)
+        r%role = c%role()
+        r%varied = trim(c%varied)
+        r%noise_case = ''
+        if (c%noise_case > 0) r%noise_case = trim(request%plan%cases(c%noise_case)%label)
+        r%control_of = ''
+        if (c%control_of > 0) r%control_of = trim(request%plan%cases(c%control_of)%label)
         r%acf = trim(c%acf)
         r%cov = c%cov
         r%mean = c%mean
         r%is_homogeneous = c%is_homogeneous
-        r%distribution = ''
+        r%distribution = trim(c%distribution)
+        r%scale_x = c%scale_x
+        r%scale_y = c%scale_y
         if (size(director%record%fields) > 0) r%field_units = director%record%fields(1)%units
-        if (c%is_homogeneous .or. .not. request%config%has_random_field) cycle
-        r%distribution = trim(request%config%random_fields(1)%distribution)
-        r%scale_x = request%config%random_fields(1)%scale_x
-        r%scale_y = request%config%random_fields(1)%scale_y
       end associate
     end do
   end subroutine set_up
@@ -296,18 +291,16 @@ contains
   subroutine missing_members(director, tasks)
     type(ensemble_director_t), intent(in) :: director
     integer(i8), allocatable, intent(out) :: tasks(:, :)
-    integer(i8) :: position, id, done, failed
-    integer :: case_index, number
+    integer(i8), allocatable :: all_members(:, :)
+    logical, allocatable :: is_missing(:)
+    integer(i8) :: k
 
-    call director%count_members(done, failed)
-    allocate (tasks(2, director%plan%total() - done))
-    number = 0
-    do position = 1, director%plan%total()
-      call director%plan%member(position, case_index, id)
-      if (director%results(case_index)%present(id)) cycle
-      number = number + 1
-      tasks(:, number) = [int(case_index, i8), id]
+    call director%plan%members_in_order(all_members)
+    allocate (is_missing(size(all_members, 2, kind=i8)))
+    do k = 1, size(is_missing, kind=i8)
+      is_missing(k) = .not. director%results(all_members(1, k))%present(all_members(2, k))
     end do
+    tasks = reshape(pack(all_members, spread(is_missing, 1, 2)), [2_i8, count(is_missing, kind=i8)])
   end subroutine missing_members
 
   !> Last lines, last state of the files, and the exit code.
@@ -352,9 +345,10 @@ contains
       call director%progress%say('stopped by '//director%stop_reason//': '//text// &
         '; the same command goes on')
       do i = 1, size(director%results)
-        associate (r => director%results(i))
-          if (all(r%present)) cycle
-          call director%progress%say('not run of '//r%label//': '//id_list(.not. r%present))
+        associate (r => director%results(i), range => director%plan%range_of(i))
+          if (all(r%present(range(1):range(2)))) cycle
+          call director%progress%say('not run of '//r%label//': '// &
+            id_list(.not. r%present(range(1):range(2)), range(1)))
         end associate
       end do
     case (EXIT_TOO_MANY_FAILED)
@@ -371,18 +365,17 @@ contains
     type(ensemble_director_t), intent(inout) :: director
     type(sample_statistics_t) :: s
     character(len=:), allocatable :: text
-    integer :: i, n
+    integer :: i
 
     do i = 1, size(director%results)
-      associate (r => director%results(i))
-        n = contiguous_prefix(r%present)
-        s = describe(r%values(RUNOUT_Q995, :n), r%status(:n) == STATUS_OK)
-        if (s%count == 0) cycle
-        text = r%label//': runout_q995 mean '//to_text(s%mean, 6)
-        if (s%count > 1) text = text//' +- '//to_text(s%half_width, 3)//' m (95 %), sd '// &
-          to_text(s%sd, 4)
-        call director%progress%say(text//' m, n='//to_text(s%count)//' (ids 1-'//to_text(n)//')')
-      end associate
+      s = director%statistics_of(i)
+      if (s%count == 0) cycle
+      text = director%results(i)%label//': runout_q995 mean '//to_text(s%mean, 6)
+      if (s%count > 1) text = text//' +- '//to_text(s%half_width, 3)//' m (95 %), sd '// &
+        to_text(s%sd, 4)
+      call director%progress%say(text//' m, n='//to_text(s%count)//' (ids '// &
+        to_text(director%plan%first)//'-'//to_text(director%plan%first + director%prefix_of(i) &
+        - 1)//')')
     end do
   end subroutine tell_cases
 end module sg_driver

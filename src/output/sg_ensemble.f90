@@ -11,14 +11,30 @@ module sg_ensemble
   implicit none
   private
 
-  public :: case_results_t, run_record_t, write_ensemble, ENSEMBLE_NAME
+  public :: case_geometry_t, case_results_t, run_record_t, write_ensemble, ENSEMBLE_NAME
 
   character(len=*), parameter :: ENSEMBLE_NAME = 'ensemble.h5'
   integer, parameter :: REASON_LENGTH = 160
 
+  !> Where the bodies of a case stand and how its grid lies, in m.
+  type :: case_geometry_t
+    !> Initial toe, from which runouts are measured, extent of the measured bodies, and the spacing
+    !> of points.
+    real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
+    real(wp) :: point_spacing = 0.0_wp
+    real(wp) :: x_min = 0.0_wp, x_max = 0.0_wp, y_min = 0.0_wp, y_max = 0.0_wp
+    real(wp) :: cell_size = 0.0_wp
+    !> Cell centres of the columns of the profile; `outcome%height` has the same size.
+    real(wp), allocatable :: profile_x(:)
+  end type case_geometry_t
+
   !> The members of one study case that are there, at the position of their id.
   type :: case_results_t
     character(len=:), allocatable :: label, acf, distribution
+    !> As in sg_plan: what it is there for, what its variant is, and the labels of the homogeneous
+    !> case that is its noise floor and of the case that it is the twin of; empty for none.
+    character(len=:), allocatable :: role, varied, noise_case, control_of
+    type(case_geometry_t) :: geometry
     !> Of the property of the first random field.
     character(len=:), allocatable :: field_units
     real(wp) :: cov = 0.0_wp, mean = 0.0_wp, scale_x = 0.0_wp, scale_y = 0.0_wp
@@ -42,11 +58,9 @@ module sg_ensemble
     character(len=:), allocatable :: field_method, sampling
     integer(i8) :: seed = 0
     integer :: ranks = 1, realizations = 0
-    real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
-    real(wp) :: x_min = 0.0_wp, x_max = 0.0_wp, y_min = 0.0_wp, y_max = 0.0_wp
-    real(wp) :: cell_size = 0.0_wp, point_spacing = 0.0_wp
-    !> Cell centres of the columns of the profile, in m.
-    real(wp), allocatable :: profile_x(:)
+    !> The keys that results depend on, one a line, and the ids that this run was to compute; empty
+    !> for all.
+    character(len=:), allocatable :: identity, members
     !> The random fields; size 0 for a deterministic run.
     type(field_record_t), allocatable :: fields(:)
   end type run_record_t
@@ -54,13 +68,14 @@ module sg_ensemble
 contains
 
   !> Room for `members` members; none is there yet.
-  subroutine init(this, members, profile_columns)
+  subroutine init(this, members, geometry)
     class(case_results_t), intent(inout) :: this
     integer(i8), intent(in) :: members
-    integer, intent(in) :: profile_columns
+    type(case_geometry_t), intent(in) :: geometry
 
+    this%geometry = geometry
     allocate (this%present(members), this%status(members), this%reason(members))
-    allocate (this%values(COLUMN_COUNT, members), this%height(profile_columns, members))
+    allocate (this%values(COLUMN_COUNT, members), this%height(size(geometry%profile_x), members))
     this%present = .false.
   end subroutine init
 
@@ -99,11 +114,12 @@ contains
     call file%create(path//'.new', error)
     if (allocated(error)) return
     call write_provenance(file, record)
-    call write_geometry(file, record)
+    call file%make_group('/geometry')
+    call write_geometry(file, '/geometry', results(1)%geometry)
     call write_field_records(file, record%fields)
     call file%make_group('/cases')
     do i = 1, size(results)
-      call write_case(file, results(i), i, record%profile_x)
+      call write_case(file, results(i), i)
     end do
     call file%close(error)
     if (.not. allocated(error)) call replace_file(path//'.new', path, error)
@@ -132,6 +148,8 @@ contains
     call file%set('/', 'realizations', int(record%realizations, i4))
     call set_text(file, 'namelist', record%case_text)
     call set_text(file, 'resolved_namelist', record%resolved)
+    call set_text(file, 'identity', record%identity)
+    call file%set('/', 'members', record%members)
   end subroutine write_provenance
 
   !> An attribute of the root or, where the text is too long for one (64 KiB), a dataset there.
@@ -146,27 +164,27 @@ contains
     end if
   end subroutine set_text
 
-  subroutine write_geometry(file, record)
+  !> As attributes of a group.
+  subroutine write_geometry(file, group, geometry)
     type(hdf5_file_t), intent(inout) :: file
-    type(run_record_t), intent(in) :: record
+    character(len=*), intent(in) :: group
+    type(case_geometry_t), intent(in) :: geometry
 
-    call file%make_group('/geometry')
-    call file%set('/geometry', 'toe', record%toe)
-    call file%set('/geometry', 'initial_height', record%initial_height)
-    call file%set('/geometry', 'initial_width', record%initial_width)
-    call file%set('/geometry', 'x_min', record%x_min)
-    call file%set('/geometry', 'x_max', record%x_max)
-    call file%set('/geometry', 'y_min', record%y_min)
-    call file%set('/geometry', 'y_max', record%y_max)
-    call file%set('/geometry', 'cell_size', record%cell_size)
-    call file%set('/geometry', 'point_spacing', record%point_spacing)
+    call file%set(group, 'toe', geometry%toe)
+    call file%set(group, 'initial_height', geometry%initial_height)
+    call file%set(group, 'initial_width', geometry%initial_width)
+    call file%set(group, 'x_min', geometry%x_min)
+    call file%set(group, 'x_max', geometry%x_max)
+    call file%set(group, 'y_min', geometry%y_min)
+    call file%set(group, 'y_max', geometry%y_max)
+    call file%set(group, 'cell_size', geometry%cell_size)
+    call file%set(group, 'point_spacing', geometry%point_spacing)
   end subroutine write_geometry
 
-  subroutine write_case(file, results, order, profile_x)
+  subroutine write_case(file, results, order)
     type(hdf5_file_t), intent(inout) :: file
     type(case_results_t), intent(in) :: results
     integer, intent(in) :: order
-    real(wp), intent(in) :: profile_x(:)
     character(len=:), allocatable :: group
     integer, allocatable :: rows(:)
     integer :: i
@@ -175,6 +193,11 @@ contains
     rows = pack([(i, i=1, size(results%present))], results%present)
     call file%make_group(group)
     call file%set(group, 'label', results%label)
+    call file%set(group, 'role', results%role)
+    call file%set(group, 'varied', results%varied)
+    call file%set(group, 'noise_case', results%noise_case)
+    call file%set(group, 'control_of', results%control_of)
+    call write_geometry(file, group, results%geometry)
     call file%set(group, 'acf', results%acf)
     call file%set(group, 'cov', results%cov)
     call file%set(group, 'mean', results%mean)
@@ -195,7 +218,7 @@ contains
     end do
     call file%write(group//'/reason', results%reason(rows), '1')
     call file%make_group(group//'/profile')
-    call file%write(group//'/profile/x', profile_x, 'm')
+    call file%write(group//'/profile/x', results%geometry%profile_x, 'm')
     call file%write(group//'/profile/height', results%height(:, rows), 'm')
   end subroutine write_case
 

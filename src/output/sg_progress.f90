@@ -82,9 +82,10 @@ contains
     if (max(written, status) > 0) return ! the line is lost, no result
   end subroutine add_line
 
-  !> Ids that are marked, like `17-23,31`.
-  pure function id_list(marked) result(text)
+  !> Ids that are marked, like `17-23,31`; the first is `id_of_first`.
+  pure function id_list(marked, id_of_first) result(text)
     logical, intent(in) :: marked(:)
+    integer(i8), intent(in) :: id_of_first
     character(len=:), allocatable :: text
     integer :: first, last
 
@@ -98,8 +99,8 @@ contains
           last = last + 1
         end do
         if (len(text) > 0) text = text//','
-        text = text//to_text(first)
-        if (last > first) text = text//'-'//to_text(last)
+        text = text//to_text(id_of_first + first - 1)
+        if (last > first) text = text//'-'//to_text(id_of_first + last - 1)
         first = last
       end if
       first = first + 1

@@ -5,7 +5,8 @@
 !> into the present directory. Prints; judges nothing.
 program bench_scheduler
   use sg_comm, only: comm_t
-  use sg_ensemble, only: case_results_t, ENSEMBLE_NAME, run_record_t, write_ensemble
+  use sg_ensemble, only: case_geometry_t, case_results_t, ENSEMBLE_NAME, run_record_t, &
+    write_ensemble
   use sg_errors, only: error_t
   use sg_journal, only: JOURNAL_NAME
   use sg_kinds, only: i1, i8, wp
@@ -135,14 +136,19 @@ contains
     type(outcome_t) :: outcome
     type(error_t), allocatable :: error
     real(wp) :: seconds
-    integer :: k, id
+    integer :: i, k, id
 
     if (comm%rank() /= 0) return
     do k = 1, CASES
       results(k)%label = 'case_'//achar(iachar('a') + k)
       results(k)%acf = 'snx'
       results(k)%distribution = 'normal'
-      call results(k)%init(int(MEMBERS_PER_CASE, i8), PROFILE_COLUMNS)
+      results(k)%role = 'study'
+      results(k)%varied = ''
+      results(k)%noise_case = ''
+      results(k)%control_of = ''
+      call results(k)%init(int(MEMBERS_PER_CASE, i8), case_geometry_t(profile_x=[(0.125_wp*i, i=1, &
+        PROFILE_COLUMNS)]))
       do id = 1, MEMBERS_PER_CASE
         call make_row(k, int(id, i8), outcome)
         call results(k)%put(outcome)
@@ -160,7 +166,6 @@ contains
 
   subroutine make_record(record)
     type(run_record_t), intent(out) :: record
-    integer :: i
 
     record%case_text = '&case /'
     record%resolved = '&case /'
@@ -170,7 +175,10 @@ contains
     record%state = 'bench'
     record%config_hash = ''
     record%field_method = ''
-    record%profile_x = [(0.125_wp*i, i=1, PROFILE_COLUMNS)]
+    record%identity = ''
+    record%members = ''
+    record%sampling = ''
+    allocate (record%fields(0))
   end subroutine make_record
 
   !> What rank 0 does for one row that waits, but for keeping it: look, receive, unpack, and a new

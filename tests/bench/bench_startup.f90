@@ -2,11 +2,9 @@
 !> each member (field, points, grid, first mapping), against the time of a member.
 !> Usage: bench_startup CASE.nml. Processor time; judges nothing.
 program bench_startup
-  use case_file, only: read_case, stop_on_error
+  use case_file, only: read_case_variants, stop_on_error
   use sg_collapse, only: collapse_model_t
-  use sg_config, only: config_t
   use sg_errors, only: error_t
-  use sg_field_properties, only: compose_properties
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
@@ -15,11 +13,12 @@ program bench_startup
   use sg_random_fields, only: field_values_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
+  use sg_study, only: variant_t
   use sg_variation, only: variation_t
   implicit none
 
   integer, parameter :: REPEATS = 50
-  type(config_t) :: config
+  type(variant_t), allocatable :: variants(:)
   type(plan_t) :: plan
   type(collapse_model_t) :: model
   type(error_t), allocatable :: error
@@ -27,9 +26,9 @@ program bench_startup
   real(wp) :: field, preparing, whole
 
   call get_command_argument(1, argument)
-  call read_case(trim(argument), config)
-  if (.not. config%has_random_field) error stop 'a case with a random field is needed'
-  call create_plan(config, plan)
+  call read_case_variants(trim(argument), variants)
+  if (.not. variants(1)%config%has_random_field) error stop 'a case with a random field is needed'
+  call create_plan(variants, plan)
   call time_once()
   field = field_seconds()
   preparing = member_seconds(0, REPEATS)
@@ -56,17 +55,17 @@ contains
     real(wp) :: started, scene_done, all_done
 
     call cpu_time(started)
-    call build_scene(config, scene, error)
+    call build_scene(variants(1)%config, scene, error)
     call stop_on_error(error)
     call cpu_time(scene_done)
-    call model%init(config, plan, error)
+    call model%init(variants, plan, error)
     call stop_on_error(error)
     call cpu_time(all_done)
     print '(a, i0, a, i0, a)', 'once on each rank, ', scene%particles%count, ' points, ', &
-      size(config%study%acf), ' autocorrelation functions:'
+      size(variants(1)%config%study%acf), ' autocorrelation functions:'
     call say('  scene', scene_done - started)
     call say('  factors of the fields', max(all_done - 2*scene_done + started, 0.0_wp))
-    print '(2x, a)', model%field_method()
+    print '(2x, a)', model%grounds(1)%field_method()
   end subroutine time_once
 
   !> One random field.
@@ -89,10 +88,9 @@ contains
     type(variation_t), intent(out) :: variation
     type(field_values_t), allocatable :: values(:)
 
-    call model%fields(1)%realize(id, values, error)
+    call model%grounds(1)%fields(1)%realize(id, values, error)
     call stop_on_error(error)
-    call compose_properties(config, model%fields(1)%fields, values, model%points, &
-      variation%properties)
+    allocate (variation%properties, source=model%grounds(1)%properties_of(values))
   end subroutine draw
 
   !> A member that ends after `last_step`, without its field.
@@ -110,8 +108,9 @@ contains
     variation%last_step = last_step
     call cpu_time(started)
     do k = 1, repeats
-      call reset_outcome(outcome, 2, 1_i8, size(model%scene%profile_x))
-      call simulate(config, model%scene, variation, monitor, observer, outcome)
+      call reset_outcome(outcome, 2, 1_i8, model%profile_size(2))
+      call simulate(variants(1)%config, model%grounds(1)%scene, variation, monitor, observer, &
+        outcome)
     end do
     call cpu_time(seconds)
     seconds = (seconds - started)/repeats

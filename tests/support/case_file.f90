@@ -4,11 +4,12 @@ module case_file
   use sg_config, only: config_t
   use sg_errors, only: error_t
   use sg_posix, only: read_text
-  use sg_read_config, only: read_config
+  use sg_read_config, only: read_config, read_variants
+  use sg_study, only: variant_t
   implicit none
   private
 
-  public :: read_case, stop_on_error
+  public :: read_case, read_case_variants, stop_on_error
 
 contains
 
@@ -24,6 +25,19 @@ contains
     call read_config(text, path, config, error)
     call stop_on_error(error)
   end subroutine read_case
+
+  !> The variants of a case that its study makes, likewise.
+  subroutine read_case_variants(path, variants)
+    character(len=*), intent(in) :: path
+    type(variant_t), allocatable, intent(out) :: variants(:)
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: text
+
+    call read_text(path, text, error)
+    call stop_on_error(error)
+    call read_variants(text, path, variants, error)
+    call stop_on_error(error)
+  end subroutine read_case_variants
 
   !> Ends the program with the message of an error, if there is one.
   subroutine stop_on_error(error)
