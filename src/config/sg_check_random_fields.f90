@@ -39,7 +39,27 @@ contains
       call check_correlation(desk, k)
     end do
     call check_cross_correlations(desk)
+    call check_importance(desk)
   end subroutine check_random_fields
+
+  !> The weights of importance sampling are those of one Gaussian field that is free.
+  subroutine check_importance(desk)
+    type(desk_t), intent(inout) :: desk
+    character(len=*), parameter :: MONTE_CARLO = 'monte_carlo', KEY = 'sampling'
+    integer :: k
+
+    if (.not. desk%good(MONTE_CARLO, 1, KEY)) return
+    if (desk%config%monte_carlo%sampling /= 'importance') return
+    associate (fields => desk%config%random_fields)
+      if (any([(fields(k)%data /= '' .or. fields(k)%file /= '', k=1, size(fields))])) then
+        call desk%fault(MONTE_CARLO, 1, KEY, '''importance'' shifts fields that are sampled '// &
+          'and know of no measurements (allowed: without data and file)')
+      else if (size(desk%config%cross_correlations) > 0) then
+        call desk%fault(MONTE_CARLO, 1, KEY, '''importance'' shifts the first field, which '// &
+          'must not be correlated with others (allowed: without &cross_correlation)')
+      end if
+    end associate
+  end subroutine check_importance
 
   subroutine check_name(desk, k)
     type(desk_t), intent(inout) :: desk

@@ -77,6 +77,8 @@ module sg_config
   end type loading_config_t
 
   type :: solver_config_t
+    !> What computes a member.
+    character(len=NAME_LENGTH) :: model
     character(len=NAME_LENGTH) :: weighting, scheme, transfer, anti_locking, precision
     real(wp) :: flip
     real(wp) :: cfl
@@ -116,6 +118,8 @@ module sg_config
     integer :: realizations
     integer(i8) :: seed
     character(len=NAME_LENGTH) :: stop_rule, sampling
+    !> Shift of importance sampling, in standard deviations of the spatial mean.
+    real(wp) :: tilt
     !> Members of the homogeneous case: 1 nominal and the rest with meaningless perturbations.
     integer :: noise_members
     !> Share of failed members up to which the run still counts as good (exit code 0).

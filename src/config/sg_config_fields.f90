@@ -264,6 +264,7 @@ contains
     class(config_visitor_t), intent(inout) :: visitor
 
     call visitor%begin_group('solver', 1)
+    call visitor%visit('model', config%solver%model)
     call visitor%visit('weighting', config%solver%weighting)
     call visitor%visit('scheme', config%solver%scheme)
     call visitor%visit('transfer', config%solver%transfer)
@@ -321,6 +322,7 @@ contains
     call visitor%visit('realizations', config%monte_carlo%realizations)
     call visitor%visit('seed', config%monte_carlo%seed)
     call visitor%visit('sampling', config%monte_carlo%sampling)
+    call visitor%visit('tilt', config%monte_carlo%tilt)
     call visitor%visit('stop_rule', config%monte_carlo%stop_rule)
     call visitor%visit('noise_members', config%monte_carlo%noise_members)
     call visitor%visit('max_failed_fraction', config%monte_carlo%max_failed_fraction)

@@ -244,6 +244,9 @@ module sg_schema
     'deformation plastic_strain velocity_gradient wave_speed ledger'
 
   type(key_t), parameter :: SOLVER_KEYS(*) = [ &
+    key_t('solver', 'model', KIND_WORD, default='gimp', choices='gimp linear_functional', &
+    meaning='linear_functional: nothing moves, runouts are weighted means of the first field, '// &
+    'whose statistics are known exactly (check of the Monte Carlo engine, docs/statistics.md)'), &
     key_t('solver', 'weighting', KIND_WORD, default='gimp', &
     choices='linear gimp cpgimp bspline', meaning='Weighting function of a point: gimp is '// &
     'uGIMP, in cpgimp its domain follows its stretch, bspline is quadratic'), &
@@ -355,9 +358,12 @@ module sg_schema
     key_t('monte_carlo', 'seed', KIND_INTEGER, default='2022', range='[0,)', &
     meaning='First word of the key of the random numbers (Philox4x64-10)'), &
     key_t('monte_carlo', 'sampling', KIND_WORD, default='random', &
-    choices='random antithetic latin_hypercube', needs='random_field', &
+    choices='random antithetic latin_hypercube importance', needs='random_field', &
     meaning='random: members are independent; antithetic: every second one mirrors the one '// &
-    'before; latin_hypercube: stratified over all realizations'), &
+    'before; latin_hypercube: stratified over all realizations; importance: weighted, by tilt'), &
+    key_t('monte_carlo', 'tilt', KIND_REAL, unit='1', example='-2.5', required=.true., &
+    when='sampling', when_is='importance', meaning='Importance sampling: shift of the spatial '// &
+    'mean of the first Gaussian field, in its own standard deviations'), &
     key_t('monte_carlo', 'stop_rule', KIND_WORD, default='count', choices='count', &
     later='precision successive', needs='random_field', identity=.false., &
     meaning='When to end a case: after all realizations, or earlier'), &

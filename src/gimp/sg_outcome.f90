@@ -14,7 +14,7 @@ module sg_outcome
   public :: SETTLE_TIME, SETTLED, KINETIC_ENERGY_END, KINETIC_ENERGY_RATIO, WALL_TOUCHED
   public :: ENERGY_ERROR, MASS_ERROR
   public :: FIELD_MEAN, FIELD_MIN, FIELD_MAX, FIELD_CLIPPED, STEPS, SECONDS
-  public :: FAILURE_STEP, FAILURE_POINT, FAILURE_X, FAILURE_Y
+  public :: FAILURE_STEP, FAILURE_POINT, FAILURE_X, FAILURE_Y, LOG_WEIGHT
 
   integer, parameter :: STATUS_OK = 0
   !> Asked to stop before it ended: computed again later, never recorded.
@@ -36,7 +36,9 @@ module sg_outcome
   integer, parameter :: FIELD_MEAN = 14, FIELD_MIN = 15, FIELD_MAX = 16, FIELD_CLIPPED = 17
   integer, parameter :: STEPS = 18, SECONDS = 19
   integer, parameter :: FAILURE_STEP = 20, FAILURE_POINT = 21, FAILURE_X = 22, FAILURE_Y = 23
-  integer, parameter :: COLUMN_COUNT = 23
+  !> Of importance sampling: ln of the likelihood ratio; 0 for members that all count the same.
+  integer, parameter :: LOG_WEIGHT = 24
+  integer, parameter :: COLUMN_COUNT = 24
 
   type :: column_t
     character(len=24) :: name
@@ -69,7 +71,8 @@ module sg_outcome
     column_t('failure_step', '1', .true.), &
     column_t('failure_point', '1', .true.), &
     column_t('failure_x', 'm', .false.), &
-    column_t('failure_y', 'm', .false.)]
+    column_t('failure_y', 'm', .false.), &
+    column_t('log_weight', '1', .false.)]
 
   !> One member. A failed one keeps what is known of it; what is not known is NaN (integers: -1).
   type :: outcome_t

@@ -5,12 +5,13 @@ module sg_collapse
   use sg_errors, only: error_t
   use sg_ground, only: build_grounds, ground_t
   use sg_kinds, only: i8, wp
+  use sg_linear_functional, only: take_functionals
   use sg_materials, only: MODEL_MOHR_COULOMB
   use sg_member_model, only: member_model_t
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, FIELD_MAX, FIELD_MEAN, FIELD_MIN, &
-    outcome_t, reset_outcome, STATUS_ABANDONED, STATUS_FIELD_FAILED, STATUS_OK, &
+    LOG_WEIGHT, outcome_t, reset_outcome, STATUS_ABANDONED, STATUS_FIELD_FAILED, STATUS_OK, &
     STATUS_TIME_LIMIT, status_text, STEPS
   use sg_philox, only: fill_uniform, NOISE_STREAM
   use sg_plan, only: plan_t
@@ -108,7 +109,9 @@ contains
       return
     end if
     associate (ground => this%grounds(this%plan%cases(case_index)%variant))
-      if (is_recorded(this, ground%config, id)) then
+      if (ground%config%solver%model == 'linear_functional') then
+        call take_functionals(ground, values, outcome)
+      else if (is_recorded(this, ground%config, id)) then
         call this%record_member(case_index, id, variation, monitor, outcome)
       else
         call simulate(ground%config, ground%scene, variation, monitor, nobody, outcome)
@@ -117,6 +120,7 @@ contains
     if (outcome%values(FAILURE_STEP) > 0.0_wp .and. .not. this%record_nothing) then
       call this%keep_capsule(case_index, id, variation, monitor, outcome)
     end if
+    outcome%values(LOG_WEIGHT) = 0.0_wp
     if (allocated(values)) call describe_field(values(1), outcome)
   end subroutine run_collapse
 
@@ -203,6 +207,7 @@ contains
     outcome%values(FIELD_MIN) = minval(field%values)
     outcome%values(FIELD_MAX) = maxval(field%values)
     outcome%values(FIELD_CLIPPED) = field%clipped_share
+    outcome%values(LOG_WEIGHT) = field%log_weight
   end subroutine describe_field
 
   !> Member 1 is nominal, the others differ by what means nothing. With random fields, properties
