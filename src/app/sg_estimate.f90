@@ -12,6 +12,7 @@ module sg_estimate
   use sg_random_fields, only: random_fields_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
+  use sg_stop_rule, only: make_stop_rule, RULE_COUNT, stop_rule_t
   use sg_text, only: text_of_duration, to_text
   use sg_variation, only: variation_t
   implicit none
@@ -33,7 +34,8 @@ contains
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
     type(scene_t) :: scene
-    character(len=:), allocatable :: field
+    type(stop_rule_t) :: rule
+    character(len=:), allocatable :: field, bound
     real(wp) :: step_seconds, member_seconds, megabytes, limit
     integer(i8) :: steps_needed, members
     integer :: cells_x, cells_y
@@ -49,6 +51,9 @@ contains
     step_seconds = time_step_cost(config, scene)
     member_seconds = FLOW_FACTOR*step_seconds*real(steps_needed, wp)
     members = plan%total()
+    rule = make_stop_rule(config%monte_carlo)
+    bound = 'about '
+    if (rule%rule /= RULE_COUNT) bound = 'at most about '
     megabytes = real(members, wp)*(8.0_wp*COLUMN_COUNT + 4.0_wp*cells_x + 32.0_wp)*2.0_wp*1.0e-6_wp
     text = 'case            '//trim(config%name)//line( &
       'points          '//to_text(scene%particles%count)//' in '//to_text(size(config%bodies))// &
@@ -66,10 +71,11 @@ contains
       'random field    '//field)//line( &
       'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '// &
       case_list(plan))//line( &
+      'stop rule       '//rule%in_words())//line( &
       'one member      about '//text_of_duration(member_seconds)//' ('// &
       to_text(1.0e9_wp*step_seconds/scene%particles%count, &
       3)//' ns per point and step here and now)')//line( &
-      'all             about '//to_text(members*member_seconds/3600.0_wp, &
+      'all             '//bound//to_text(members*member_seconds/3600.0_wp, &
       3)//' core-hours')//line( &
       'disk            about '//to_text(megabytes, 3)//' MB, snapshots not counted')//line( &
       'directory       '//config%output%directory)

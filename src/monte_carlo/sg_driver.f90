@@ -17,6 +17,7 @@ module sg_driver
   use sg_progress, only: id_list, json_text
   use sg_scheduler, only: run_members
   use sg_statistics, only: contiguous_prefix, describe, sample_statistics_t
+  use sg_stop_rule, only: make_stop_rule
   use sg_text, only: text_of_duration, to_text
   use sg_timer, only: wall_seconds
   implicit none
@@ -84,7 +85,7 @@ contains
     call comm%agree(error)
     if (.not. allocated(error)) then
       allocate (tasks(2, 0))
-      if (comm%rank() == 0) call missing_members(director, tasks)
+      if (comm%rank() == 0) call missing_members(request%plan, director, tasks)
       call run_members(comm, tasks, director, model, request%config%monte_carlo%member_seconds)
       if (comm%rank() == 0) call finish(request, director, exit_code, error)
       call comm%agree(error)
@@ -175,6 +176,7 @@ contains
       record%cell_size = config%grid%cell_size
       record%profile_x = request%profile_x
     end associate
+    call director%watch%init(make_stop_rule(request%config%monte_carlo), size(request%plan%cases))
     allocate (director%results(size(request%plan%cases)))
     do i = 1, size(director%results)
       associate (r => director%results(i), c => request%plan%cases(i))
@@ -292,8 +294,10 @@ contains
       ' of '//director%results(damage%case_index)%label//' ('//text//')'
   end function damaged_name
 
-  !> Members of the plan that are not there, in its order.
-  subroutine missing_members(director, tasks)
+  !> Members of the plan that are not there, in its order; of cases that have ended none.
+  subroutine missing_members(plan, director, tasks)
+    !> As it was made, before any case has ended.
+    type(plan_t), intent(in) :: plan
     type(ensemble_director_t), intent(in) :: director
     integer(i8), allocatable, intent(out) :: tasks(:, :)
     integer(i8) :: position, id, done, failed
@@ -302,8 +306,9 @@ contains
     call director%count_members(done, failed)
     allocate (tasks(2, director%plan%total() - done))
     number = 0
-    do position = 1, director%plan%total()
-      call director%plan%member(position, case_index, id)
+    do position = 1, plan%total()
+      call plan%member(position, case_index, id)
+      if (.not. director%wants(case_index, id)) cycle
       if (director%results(case_index)%present(id)) cycle
       number = number + 1
       tasks(:, number) = [int(case_index, i8), id]
@@ -366,7 +371,7 @@ contains
       to_text(done)//',"failed":'//to_text(failed)//',"exit_code":'//to_text(exit_code))
   end subroutine tell_end
 
-  !> One line a case, over its ids without a gap.
+  !> For each case a line over its ids without a gap, and what the rule says of them.
   subroutine tell_cases(director)
     type(ensemble_director_t), intent(inout) :: director
     type(sample_statistics_t) :: s
@@ -382,6 +387,7 @@ contains
         if (s%count > 1) text = text//' +- '//to_text(s%half_width, 3)//' m (95 %), sd '// &
           to_text(s%sd, 4)
         call director%progress%say(text//' m, n='//to_text(s%count)//' (ids 1-'//to_text(n)//')')
+        call director%tell_rule(i)
       end associate
     end do
   end subroutine tell_cases
