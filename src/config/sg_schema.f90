@@ -1,9 +1,7 @@
 !> What a case file may hold: one row for each group and each key. Scanning, checking, reading,
 !> `resolved.nml`, `--keys` and `--defaults` all follow this table.
 !>
-!> Words in `choices` are accepted; words in `later` are known, but belong to a later version and
-!> are refused. A new key needs a row here, a line in `sg_config_fields` and a component of
-!> `config_t`.
+!> A new key needs a row here, a line in `sg_config_fields` and a component of `config_t`.
 module sg_schema
   implicit none
   private
@@ -51,7 +49,6 @@ module sg_schema
     !> is no bound.
     character(len=24) :: range = '(,)'
     character(len=128) :: choices = ''
-    character(len=96) :: later = ''
     !> Number of values, or ANY_NUMBER.
     integer :: size = 1
     !> Must be given wherever it applies.
