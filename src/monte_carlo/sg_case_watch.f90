@@ -10,6 +10,9 @@ module sg_case_watch
 
   public :: case_watch_t
 
+  !> Members of which something is forecast.
+  integer, parameter :: FEWEST = 10
+
   type :: case_watch_t
     type(stop_rule_t) :: rule
     !> Of each case: ids from 1 on without a gap, and what the last look at them has found.
@@ -18,6 +21,7 @@ module sg_case_watch
   contains
     procedure :: init
     procedure :: look
+    procedure :: is_over
     procedure :: forecast
     procedure :: in_words
     procedure :: as_json
@@ -37,40 +41,63 @@ contains
     this%judgements%forecast = rule%most
   end subroutine init
 
-  !> After a member was put into the results of a case: where the rule is met, they end there. Cases
-  !> that are homogeneous or have ended are left alone.
+  !> After a member was put into the results of a case: where the rule is met, they end there.
+  !> Homogeneous cases run all their members.
   subroutine look(this, case_index, results)
     class(case_watch_t), intent(inout) :: this
     integer, intent(in) :: case_index
     type(case_results_t), intent(inout) :: results
 
-    if (this%rule%rule == RULE_COUNT .or. results%is_homogeneous) return
+    if (this%rule%rule == RULE_COUNT) return
     associate (n => this%prefix(case_index), judgement => this%judgements(case_index))
-      if (judgement%is_met) return
       do while (n < size(results%present))
         if (.not. results%present(n + 1)) exit
         n = n + 1
       end do
+      if (results%is_homogeneous .or. judgement%is_met) return
       call this%rule%follow(results%values(this%rule%column, :n), results%status(:n) == &
         STATUS_OK, judgement)
       if (judgement%is_met) call results%shorten(judgement%members)
     end associate
   end subroutine look
 
-  !> Members that all cases will have in the end, by what is known now.
+  !> No member of any case is missing; always false without a rule, where no member in flight can be
+  !> one too many.
+  pure logical function is_over(this, results)
+    class(case_watch_t), intent(in) :: this
+    type(case_results_t), intent(in) :: results(:)
+    integer :: i
+
+    is_over = this%rule%rule /= RULE_COUNT
+    do i = 1, size(results)
+      if (is_over) is_over = this%prefix(i) >= size(results(i)%present)
+    end do
+  end function is_over
+
+  !> Members that all cases will have in the end, by what is known now: before the first look, by
+  !> the ids without a gap if there are ten.
   function forecast(this, results) result(number)
     class(case_watch_t), intent(in) :: this
     type(case_results_t), intent(in) :: results(:)
     integer(i8) :: number
+    type(judgement_t) :: judgement
     integer :: i, expected
 
     number = 0
     do i = 1, size(results)
-      expected = size(results(i)%present)
-      if (this%rule%rule /= RULE_COUNT .and. .not. results(i)%is_homogeneous) then
-        expected = min(expected, max(this%judgements(i)%forecast, count(results(i)%present)))
-      end if
-      number = number + expected
+      associate (one => results(i))
+        expected = size(one%present)
+        if (this%rule%rule /= RULE_COUNT .and. .not. one%is_homogeneous) then
+          judgement = this%judgements(i)
+          if (judgement%members == 0 .and. this%prefix(i) >= FEWEST) then
+            judgement = this%rule%judge(one%values(this%rule%column, :this%prefix(i)), &
+              one%status(:this%prefix(i)) == STATUS_OK)
+            judgement%forecast = max(judgement%forecast, this%rule%minimum)
+          end if
+          expected = min(expected, max(judgement%forecast, count(one%present)))
+        end if
+        number = number + expected
+      end associate
     end do
   end function forecast
 

@@ -160,6 +160,8 @@ contains
       if (left > 0.0_wp .and. left < 1.1_wp*this%longest) decision = FINISH_STARTED
       if (decision /= CARRY_ON) this%stop_reason = 'the wall clock limit'
     end if
+    ! Members that other ranks hold in advance are not needed.
+    if (this%watch%is_over(this%results)) decision = max(decision, FINISH_STARTED)
     if (now - this%last_report >= this%report_seconds) call this%report()
     if (now - this%last_write >= max(this%report_seconds, this%write_cost/WRITE_SHARE)) then
       call this%write_results(error)
