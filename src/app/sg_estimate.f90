@@ -12,6 +12,7 @@ module sg_estimate
   use sg_random_fields, only: random_fields_t
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
+  use sg_stop_rule, only: make_stop_rule, RULE_COUNT, stop_rule_t
   use sg_study, only: variant_t
   use sg_text, only: text_of_duration, to_text
   use sg_variation, only: variation_t
@@ -35,6 +36,8 @@ contains
     type(error_t), allocatable, intent(out) :: error
     type(scene_t) :: scene
     character(len=:), allocatable :: more
+    type(stop_rule_t) :: rule
+    character(len=:), allocatable :: bound
     real(wp) :: seconds(size(variants)), megabytes
     integer(i8) :: members
     integer :: k, v
@@ -54,6 +57,9 @@ contains
       end if
     end do
     members = plan%total()
+    rule = make_stop_rule(variants(1)%config%monte_carlo)
+    bound = 'about '
+    if (rule%rule /= RULE_COUNT) bound = 'at most about '
     megabytes = 0.0_wp
     do k = 1, size(plan%cases)
       associate (grid => variants(plan%cases(k)%variant)%config%grid)
@@ -64,7 +70,8 @@ contains
     text = text//line( &
       'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '// &
       case_list(plan))//line( &
-      'all             about '//to_text(sum([(plan%members_of(k)*seconds(plan%cases(k)%variant), &
+      'stop rule       '//rule%in_words())//line( &
+      'all             '//bound//to_text(sum([(plan%members_of(k)*seconds(plan%cases(k)%variant), &
       k=1, size(plan%cases))])/3600.0_wp, 3)//' core-hours')//line( &
       'disk            about '//to_text(megabytes, 3)//' MB, snapshots not counted')//line( &
       'directory       '//variants(1)%config%output%directory)

@@ -77,7 +77,7 @@ contains
       if (options%output /= '') variants(v)%config%output%directory = options%output
     end do
     call create_plan(variants, plan)
-    call limit_plan(options, plan, error)
+    call limit_plan(options, variants(1)%config%monte_carlo%stop_rule, plan, error)
     if (options%realization > 0 .and. options%write_fields == '' .and. .not. allocated(error)) then
       call choose_member(plan, options, case_index, error)
     end if
@@ -120,14 +120,21 @@ contains
     call run_ensemble(comm, request, model, exit_code, error)
   end subroutine run_case
 
-  !> Leaves to the plan the members that the options ask for; none at all is bad input.
-  subroutine limit_plan(options, plan, error)
+  !> Leaves to the plan the members that the options ask for; none at all is bad input, and so are
+  !> some where a rule looks at the members from the first on.
+  subroutine limit_plan(options, stop_rule, plan, error)
     type(options_t), intent(in) :: options
+    character(len=*), intent(in) :: stop_rule
     type(plan_t), intent(inout) :: plan
     type(error_t), allocatable, intent(out) :: error
 
     plan%first = options%members(1)
     plan%last = options%members(2)
+    if (plan%is_part() .and. stop_rule /= 'count') then
+      call raise(error, EXIT_BAD_INPUT, '--members goes with stop_rule = ''count'' alone: '// &
+        trim(stop_rule)//' looks at the members from 1 on', 'command line')
+      return
+    end if
     if (plan%total() == 0) call raise(error, EXIT_BAD_INPUT, '--members '// &
       to_text(plan%first)//'-'//to_text(plan%last)//': there is no such member (allowed: 1 to '// &
       to_text(maxval(plan%cases%member_count))//')', 'command line')

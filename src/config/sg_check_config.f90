@@ -3,6 +3,7 @@
 module sg_check_config
   use sg_check_desk, only: check_material_name, desk_t
   use sg_check_random_fields, only: check_random_fields
+  use sg_check_stop_rule, only: check_stop_rule
   use sg_config, only: config_t, EDGE_TOLERANCE
   use sg_fault_list, only: fault_list_t, quoted
   use sg_kinds, only: wp
@@ -47,6 +48,7 @@ contains
     call check_loading(desk)
     call check_solver(desk)
     if (config%has_random_field) call check_random_fields(desk)
+    if (config%has_random_field) call check_stop_rule(desk)
     if (config%has_study) call check_study(desk)
     if (config%has_control_variate) call check_control_variate(desk)
     call check_output(desk)

@@ -15,7 +15,6 @@ module sg_check_keys
 
   public :: check_keys, check_study_keys, why_not
 
-  character(len=*), parameter :: NOT_YET = ' is not in this version yet'
   character(len=*), parameter :: NAME_CHARACTERS = &
     'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.'
 
@@ -297,28 +296,24 @@ contains
       if (e > 0) then
         if (group%entries(e)%spoilt .or. group%entries(e)%number /= 1) return
         word = lower_case(group%entries(e)%values(1)%text)
-        if (.not. has_word(trim(decider%choices)//' '//decider%later, word)) return
+        if (.not. has_word(decider%choices, word)) return
       else if (len(word) == 0) then
         return
       end if
       if (has_word(key%when_is, word)) return
-      reason = alternatives(key%when_is, decider%choices)
-      if (len(reason) == 0) reason = alternatives(key%when_is, decider%later)//', which'//NOT_YET
-      reason = 'only with '//trim(key%when)//' = '//reason
+      reason = 'only with '//trim(key%when)//' = '//alternatives(key%when_is)
     end if
   end function why_not
 
-  !> Those of `words` that are among `choices`, as `'a' or 'b'`.
-  pure function alternatives(words, choices) result(text)
-    character(len=*), intent(in) :: words, choices
+  !> Words as `'a' or 'b'`.
+  pure function alternatives(words) result(text)
+    character(len=*), intent(in) :: words
     character(len=:), allocatable :: text
     integer :: i
 
-    text = ''
-    do i = 1, count_words(words)
-      if (.not. has_word(choices, word_at(words, i))) cycle
-      if (len(text) > 0) text = text//' or '
-      text = text//quoted(word_at(words, i))
+    text = quoted(word_at(words, 1))
+    do i = 2, count_words(words)
+      text = text//' or '//quoted(word_at(words, i))
     end do
   end function alternatives
 
@@ -437,21 +432,17 @@ contains
     type(key_t), intent(in) :: key
     character(len=*), intent(in) :: word
     character(len=:), allocatable :: fault
-    character(len=24) :: candidates(count_words(key%choices) + count_words(key%later))
+    character(len=24) :: candidates(count_words(key%choices))
     character(len=:), allocatable :: hint
     integer :: i
 
     fault = ''
     if (has_word(key%choices, word)) return
-    if (has_word(key%later, word)) then
-      fault = quoted(word)//NOT_YET//' (allowed: '//listed(key%choices)//')'
-      return
-    end if
     do i = 1, size(candidates)
-      candidates(i) = word_at(trim(key%choices)//' '//key%later, i)
+      candidates(i) = word_at(key%choices, i)
     end do
     fault = quoted(word)//' is unknown (allowed: '//listed(key%choices)
-    hint = did_you_mean(word, candidates(:count_words(key%choices)), '')
+    hint = did_you_mean(word, candidates, '')
     if (len(hint) > 0) fault = fault//'; '//hint
     fault = fault//')'
   end function fault_of_word

@@ -120,6 +120,16 @@ module sg_config
     character(len=NAME_LENGTH) :: stop_rule, sampling
     !> Shift of importance sampling, in standard deviations of the spatial mean.
     real(wp) :: tilt
+    !> What the rule looks at: a runout, of it the mean, sd or share above the threshold (m).
+    character(len=NAME_LENGTH) :: stop_runout, stop_statistic
+    real(wp) :: stop_threshold
+    !> One of the two where the rule is 'precision', else size 0: m or a probability; a share of the
+    !> estimate.
+    real(wp), allocatable :: half_width(:), relative_half_width(:)
+    !> Change of the mean in m and of the variance in m^2.
+    real(wp) :: successive_tolerance
+    !> Members before the first look of the rule and between two looks.
+    integer :: stop_minimum, stop_batch
     !> Members of the homogeneous case: 1 nominal and the rest with meaningless perturbations.
     integer :: noise_members
     !> Share of failed members up to which the run still counts as good (exit code 0).

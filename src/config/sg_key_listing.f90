@@ -86,8 +86,6 @@ contains
     if (key%when /= '') text = text//'; only for '//trim(key%when)//': '//trim(key%when_is)
     if (key%needs /= '') text = text//'; only with &'//trim(key%needs)
     text = text//BREAK//repeat(' ', 28)//trim(key%meaning)//BREAK
-    if (key%later /= '') text = text//repeat(' ', &
-      28)//'(not in this version yet: '//trim(key%later)//')'//BREAK
   end function key_lines
 
   pure function type_text(key) result(text)
@@ -121,8 +119,7 @@ contains
       json_text(type_text(key))//', "unit": '//json_text(key%unit)//', "default": '// &
       json_text(key%default)// &
       ', "range": '//json_text(key%range)//', "choices": '//json_text(key%choices)// &
-      ', "later": '// &
-      json_text(key%later)//', "required": '//to_text(key%required)//', "meaning": '// &
+      ', "required": '//to_text(key%required)//', "meaning": '// &
       json_text(key%meaning)//'}'
   end function json_row
 

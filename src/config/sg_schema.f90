@@ -1,9 +1,8 @@
 !> What a case file may hold: one row for each group and each key. Scanning, checking, reading,
 !> `resolved.nml`, `--keys` and `--defaults` all follow this table.
 !>
-!> Words in `choices` are accepted; words in `later` are known, but belong to a later version and
-!> are refused. A new key needs a row here, a line in `sg_config_fields` and a component of
-!> `config_t`. Any key of one number or word may also be listed in &study (sg_study_keys).
+!> A new key needs a row here, a line in `sg_config_fields` and a component of `config_t`. Any key
+!> of one number or word may also be listed in &study (sg_study_keys).
 module sg_schema
   implicit none
   private
@@ -51,7 +50,6 @@ module sg_schema
     !> is no bound.
     character(len=24) :: range = '(,)'
     character(len=128) :: choices = ''
-    character(len=96) :: later = ''
     !> Number of values, or ANY_NUMBER.
     integer :: size = 1
     !> Must be given wherever it applies.
@@ -351,10 +349,14 @@ module sg_schema
     example='-0.5', required=.true., &
     meaning='Correlation of the two underlying Gaussian fields at the same point')]
 
+  character(len=*), parameter :: RUNOUTS = 'runout_max runout_q99 runout_q995 runout_connected'
+  character(len=*), parameter :: EARLY_RULES = 'precision successive'
+
   type(key_t), parameter :: MONTE_CARLO_KEYS(*) = [ &
     key_t('monte_carlo', 'realizations', KIND_INTEGER, example='100', range='[1,1000000000]', &
     required=.true., needs='random_field', identity=.false., &
-    meaning='Realizations of each case, in total: a resumed run may ask for more'), &
+    meaning='Realizations of each case, in total, the most of them with a stop_rule: a resumed '// &
+    'run may ask for more'), &
     key_t('monte_carlo', 'seed', KIND_INTEGER, default='2022', range='[0,)', &
     meaning='First word of the key of the random numbers (Philox4x64-10)'), &
     key_t('monte_carlo', 'sampling', KIND_WORD, default='random', &
@@ -364,9 +366,37 @@ module sg_schema
     key_t('monte_carlo', 'tilt', KIND_REAL, unit='1', example='-2.5', required=.true., &
     when='sampling', when_is='importance', meaning='Importance sampling: shift of the spatial '// &
     'mean of the first Gaussian field, in its own standard deviations'), &
-    key_t('monte_carlo', 'stop_rule', KIND_WORD, default='count', choices='count', &
-    later='precision successive', needs='random_field', identity=.false., &
-    meaning='When to end a case: after all realizations, or earlier'), &
+    key_t('monte_carlo', 'stop_rule', KIND_WORD, default='count', &
+    choices='count precision successive', needs='random_field', identity=.false., &
+    meaning='When to end a case: after all realizations; once the 95 % interval of a statistic '// &
+    'is narrow; once mean and variance hardly change (docs/stopping.md)'), &
+    key_t('monte_carlo', 'stop_runout', KIND_WORD, default='runout_q995', choices=RUNOUTS, &
+    when='stop_rule', when_is=EARLY_RULES, identity=.false., &
+    meaning='Runout that the rule looks at'), &
+    key_t('monte_carlo', 'stop_statistic', KIND_WORD, default='mean', &
+    choices='mean sd exceedance', when='stop_rule', when_is='precision', identity=.false., &
+    meaning='What must be known well: mean, standard deviation, or the probability of a runout '// &
+    'beyond stop_threshold'), &
+    key_t('monte_carlo', 'stop_threshold', KIND_REAL, unit='m', example='5', required=.true., &
+    when='stop_statistic', when_is='exceedance', identity=.false., &
+    meaning='Runout s* of the probability P(runout > s*)'), &
+    key_t('monte_carlo', 'half_width', KIND_REAL, unit='m', range='(0,)', when='stop_rule', &
+    when_is='precision', identity=.false., meaning='Half of the 95 % interval at which a case '// &
+    'ends; of exceedance a probability, without unit. This key or relative_half_width'), &
+    key_t('monte_carlo', 'relative_half_width', KIND_REAL, unit='1', range='(0,1)', &
+    when='stop_rule', when_is='precision', identity=.false., &
+    meaning='The same as a share of the estimate'), &
+    key_t('monte_carlo', 'successive_tolerance', KIND_REAL, unit='1', default='1e-3', &
+    range='(0,)', when='stop_rule', when_is='successive', identity=.false., &
+    meaning='A case ends once the last member changes the mean (m) and the variance (m^2) by '// &
+    'less; no bound of any error. The paper has 1e-3, presumably in dm and dm^2'), &
+    key_t('monte_carlo', 'stop_minimum', KIND_INTEGER, default='50', range='[10,1000000000]', &
+    when='stop_rule', when_is=EARLY_RULES, identity=.false., &
+    meaning='Members of a case before the rule is first looked at; an even number of '// &
+    'antithetic ones'), &
+    key_t('monte_carlo', 'stop_batch', KIND_INTEGER, default='10', range='[1,1000000000]', &
+    when='stop_rule', when_is=EARLY_RULES, identity=.false., &
+    meaning='Members between two such looks; an even number of antithetic ones'), &
     key_t('monte_carlo', 'noise_members', KIND_INTEGER, default='8', default_deterministic='1', &
     range='[1,1000000]', identity=.false., &
     meaning='Runs of the homogeneous case: one as given, the others with perturbations that '// &

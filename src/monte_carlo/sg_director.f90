@@ -1,6 +1,7 @@
 !> Rank 0 of an ensemble: keeps each member in journal and memory, tells of progress, rewrites
 !> ensemble.h5 now and then and decides when the run has to end.
 module sg_director
+  use sg_case_watch, only: case_watch_t
   use sg_ensemble, only: case_results_t, run_record_t, write_ensemble
   use sg_errors, only: error_t
   use sg_journal, only: journal_t
@@ -24,6 +25,8 @@ module sg_director
     type(progress_t) :: progress
     type(run_record_t) :: record
     type(case_results_t), allocatable :: results(:)
+    !> Ends cases early; the plan and the results then go as far as the member they end with.
+    type(case_watch_t) :: watch
     character(len=:), allocatable :: directory
     !> Wall clock of the start and, if the run has a limit, of its end; 0 = none.
     real(wp) :: start = 0.0_wp, deadline = 0.0_wp
@@ -40,7 +43,9 @@ module sg_director
   contains
     procedure :: accept
     procedure :: decide
+    procedure :: wants
     procedure :: keep
+    procedure :: tell_rule
     procedure :: report
     procedure :: running_text
     procedure :: write_results
@@ -63,12 +68,18 @@ contains
   subroutine accept(this, outcome)
     class(ensemble_director_t), intent(inout) :: this
     type(outcome_t), intent(in) :: outcome
+    logical :: ended
 
     if (allocated(this%error)) return
     call this%journal%add(outcome, this%error)
     if (allocated(this%error)) return
+    ended = this%results(outcome%case_index)%stop_rule_met
     call this%keep(outcome)
     this%fresh = this%fresh + 1
+    if (this%results(outcome%case_index)%stop_rule_met .and. .not. ended) then
+      call this%sync_journal()
+      call this%tell_rule(outcome%case_index)
+    end if
     if (outcome%status == STATUS_OK .and. outcome%reason == '') return
     associate (label => this%results(outcome%case_index)%label)
       if (outcome%status == STATUS_OK) then
@@ -83,15 +94,44 @@ contains
     end associate
   end subroutine accept
 
-  !> Into memory only; members outside the plan (of a longer run before) stay in the journal.
+  !> Into memory only; members outside the plan (of a longer run before, or beyond the end of a case
+  !> that a rule has ended) stay in the journal.
   subroutine keep(this, outcome)
     class(ensemble_director_t), intent(inout) :: this
     type(outcome_t), intent(in) :: outcome
 
     if (.not. this%plan%holds(outcome%case_index, outcome%id)) return
-    call this%results(outcome%case_index)%put(outcome)
+    associate (results => this%results(outcome%case_index))
+      call results%put(outcome)
+      call this%watch%look(outcome%case_index, results)
+      this%plan%cases(outcome%case_index)%member_count = size(results%present)
+    end associate
     if (outcome%values(SECONDS) > this%longest) this%longest = outcome%values(SECONDS)
   end subroutine keep
+
+  !> Members of the plan: where a case has ended, no further ones.
+  logical function wants(this, case_index, id) result(wanted)
+    class(ensemble_director_t), intent(in) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+
+    wanted = this%plan%holds(case_index, id)
+  end function wants
+
+  !> What the rule says of a case, if any looks at it.
+  subroutine tell_rule(this, case_index)
+    class(ensemble_director_t), intent(inout) :: this
+    integer, intent(in) :: case_index
+    character(len=:), allocatable :: text
+
+    text = this%watch%in_words(case_index, this%results(case_index))
+    if (text == '') return
+    associate (label => this%results(case_index)%label)
+      call this%progress%say(label//': '//text)
+      call this%progress%tell('stop_rule', '"case":'//json_text(label)//','// &
+        this%watch%as_json(case_index))
+    end associate
+  end subroutine tell_rule
 
   function decide(this) result(decision)
     class(ensemble_director_t), intent(inout) :: this
@@ -122,6 +162,8 @@ contains
       if (left > 0.0_wp .and. left < 1.1_wp*this%longest) decision = FINISH_STARTED
       if (decision /= CARRY_ON) this%stop_reason = 'the wall clock limit'
     end if
+    ! Members that other ranks hold in advance are not needed.
+    if (this%watch%is_over(this%results)) decision = max(decision, FINISH_STARTED)
     if (now - this%last_report >= this%report_seconds) call this%report()
     if (now - this%last_write >= max(this%report_seconds, this%write_cost/WRITE_SHARE)) then
       call this%write_results(error)
@@ -137,8 +179,8 @@ contains
     call this%sync_journal()
     call this%count_members(done, failed)
     this%last_report = wall_seconds()
-    call this%progress%report(done, this%plan%total(), failed, this%fresh, &
-      this%last_report - this%start, this%running_text())
+    call this%progress%report(done, this%plan%total(), this%watch%forecast(this%results), failed, &
+      this%fresh, this%last_report - this%start, this%running_text())
   end subroutine report
 
   !> Mean of the 99.5 % runout with its 95 % interval, in the study case that has come farthest,

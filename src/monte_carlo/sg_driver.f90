@@ -17,6 +17,7 @@ module sg_driver
   use sg_progress, only: id_list, json_text
   use sg_scheduler, only: run_members
   use sg_statistics, only: sample_statistics_t
+  use sg_stop_rule, only: make_stop_rule
   use sg_text, only: text_of_duration, to_text
   use sg_timer, only: wall_seconds
   implicit none
@@ -80,7 +81,7 @@ contains
     call comm%agree(error)
     if (.not. allocated(error)) then
       allocate (tasks(2, 0))
-      if (comm%rank() == 0) call missing_members(director, tasks)
+      if (comm%rank() == 0) call missing_members(request%plan, director, tasks)
       call run_members(comm, tasks, director, model, request%config%monte_carlo%member_seconds)
       if (comm%rank() == 0) call finish(request, director, exit_code, error)
       call comm%agree(error)
@@ -166,6 +167,7 @@ contains
       if (request%plan%is_part()) record%members = to_text(request%plan%first)//'-'// &
         to_text(request%plan%last)
     end associate
+    call director%watch%init(make_stop_rule(request%config%monte_carlo), size(request%plan%cases))
     allocate (director%results(size(request%plan%cases)))
     do i = 1, size(director%results)
       associate (r => director%results(i), c => request%plan%cases(i))
@@ -173,9 +175,7 @@ contains
         r%label = trim(c%label)
         r%role = c%role()
         r%varied = trim(c%varied)
-        r%noise_case = ''
         if (c%noise_case > 0) r%noise_case = trim(request%plan%cases(c%noise_case)%label)
-        r%control_of = ''
         if (c%control_of > 0) r%control_of = trim(request%plan%cases(c%control_of)%label)
         r%acf = trim(c%acf)
         r%cov = c%cov
@@ -287,18 +287,23 @@ contains
       ' of '//director%results(damage%case_index)%label//' ('//text//')'
   end function damaged_name
 
-  !> Members of the plan that are not there, in its order.
-  subroutine missing_members(director, tasks)
+  !> Members of the plan that are not there, in its order; of cases that have ended none.
+  subroutine missing_members(plan, director, tasks)
+    !> As it was made, before any case has ended.
+    type(plan_t), intent(in) :: plan
     type(ensemble_director_t), intent(in) :: director
     integer(i8), allocatable, intent(out) :: tasks(:, :)
     integer(i8), allocatable :: all_members(:, :)
     logical, allocatable :: is_missing(:)
     integer(i8) :: k
 
-    call director%plan%members_in_order(all_members)
+    call plan%members_in_order(all_members)
     allocate (is_missing(size(all_members, 2, kind=i8)))
     do k = 1, size(is_missing, kind=i8)
-      is_missing(k) = .not. director%results(all_members(1, k))%present(all_members(2, k))
+      associate (case_index => int(all_members(1, k)), id => all_members(2, k))
+        is_missing(k) = director%wants(case_index, id)
+        if (is_missing(k)) is_missing(k) = .not. director%results(case_index)%present(id)
+      end associate
     end do
     tasks = reshape(pack(all_members, spread(is_missing, 1, 2)), [2_i8, count(is_missing, kind=i8)])
   end subroutine missing_members
@@ -360,7 +365,7 @@ contains
       to_text(done)//',"failed":'//to_text(failed)//',"exit_code":'//to_text(exit_code))
   end subroutine tell_end
 
-  !> One line a case, over its ids without a gap.
+  !> For each case a line over its ids without a gap, and what the rule says of them.
   subroutine tell_cases(director)
     type(ensemble_director_t), intent(inout) :: director
     type(sample_statistics_t) :: s
@@ -376,6 +381,7 @@ contains
       call director%progress%say(text//' m, n='//to_text(s%count)//' (ids '// &
         to_text(director%plan%first)//'-'//to_text(director%plan%first + director%prefix_of(i) &
         - 1)//')')
+      call director%tell_rule(i)
     end do
   end subroutine tell_cases
 end module sg_driver

@@ -32,6 +32,7 @@ module sg_scheduler
   contains
     procedure(accept_interface), deferred :: accept
     procedure(decide_interface), deferred :: decide
+    procedure :: wants => wants_all
   end type director_t
 
   abstract interface
@@ -171,17 +172,30 @@ contains
     if (outcome%status /= STATUS_ABANDONED) call director%accept(outcome)
   end subroutine run_one
 
-  !> The next task, unless the run is ending.
+  !> Whether a member is still to be computed, asked when its turn has come; what is not wanted then
+  !> is left out for good. Directors that end cases early have a procedure of their own.
+  logical function wants_all(this, case_index, id) result(wanted)
+    class(director_t), intent(in) :: this
+    integer, intent(in) :: case_index
+    integer(i8), intent(in) :: id
+
+    wanted = .true.
+  end function wants_all
+
+  !> The next task that is wanted, unless the run is ending.
   subroutine take(this, case_and_id, found)
     class(server_t), intent(inout) :: this
     integer(i8), intent(out) :: case_and_id(2)
     logical, intent(out) :: found
 
     case_and_id = 0
-    found = this%decision == CARRY_ON .and. this%next <= size(this%tasks, 2, kind=i8)
-    if (.not. found) return
-    case_and_id = this%tasks(:, this%next)
-    this%next = this%next + 1
+    found = .false.
+    if (this%decision /= CARRY_ON) return
+    do while (.not. found .and. this%next <= size(this%tasks, 2, kind=i8))
+      case_and_id = this%tasks(:, this%next)
+      this%next = this%next + 1
+      found = this%director%wants(int(case_and_id(1)), case_and_id(2))
+    end do
   end subroutine take
 
   !> Fills up the tasks of a rank to two, or to one near the end, where a task in advance would keep

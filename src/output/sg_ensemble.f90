@@ -39,6 +39,8 @@ module sg_ensemble
     character(len=:), allocatable :: field_units
     real(wp) :: cov = 0.0_wp, mean = 0.0_wp, scale_x = 0.0_wp, scale_y = 0.0_wp
     logical :: is_homogeneous = .false.
+    !> The case ended early, by its rule.
+    logical :: stop_rule_met = .false.
     !> [members]
     logical, allocatable :: present(:)
     integer(i4), allocatable :: status(:)
@@ -49,6 +51,7 @@ module sg_ensemble
   contains
     procedure :: init
     procedure :: put
+    procedure :: shorten
   end type case_results_t
 
   !> What the root of the file says of the run.
@@ -67,13 +70,17 @@ module sg_ensemble
 
 contains
 
-  !> Room for `members` members; none is there yet.
+  !> Room for `members` members of a study case; none is there yet.
   subroutine init(this, members, geometry)
     class(case_results_t), intent(inout) :: this
     integer(i8), intent(in) :: members
     type(case_geometry_t), intent(in) :: geometry
 
     this%geometry = geometry
+    this%role = 'study'
+    this%varied = ''
+    this%noise_case = ''
+    this%control_of = ''
     allocate (this%present(members), this%status(members), this%reason(members))
     allocate (this%values(COLUMN_COUNT, members), this%height(size(geometry%profile_x), members))
     this%present = .false.
@@ -100,6 +107,19 @@ contains
       if (allocated(outcome%reason)) this%reason(id) = outcome%reason
     end associate
   end subroutine put
+
+  !> The case ends with member `members`, by its rule; what is there beyond does not belong to it.
+  subroutine shorten(this, members)
+    class(case_results_t), intent(inout) :: this
+    integer, intent(in) :: members
+
+    this%stop_rule_met = .true.
+    this%present = this%present(:members)
+    this%status = this%status(:members)
+    this%values = this%values(:, :members)
+    this%height = this%height(:, :members)
+    this%reason = this%reason(:members)
+  end subroutine shorten
 
   subroutine write_ensemble(directory, record, results, error)
     character(len=*), intent(in) :: directory
@@ -206,6 +226,7 @@ contains
     call file%set(group, 'scale_y', results%scale_y)
     call file%set(group, 'is_homogeneous', merge(1_i4, 0_i4, results%is_homogeneous))
     call file%set(group, 'planned', int(size(results%present), i4))
+    call file%set(group, 'stop_rule_met', merge(1_i4, 0_i4, results%stop_rule_met))
     call file%set(group, 'order', int(order, i4))
     call file%write(group//'/id', int(rows, i8), '1')
     call file%write(group//'/status', results%status(rows), '1')

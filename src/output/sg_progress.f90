@@ -49,24 +49,30 @@ contains
   end subroutine tell
 
   !> The progress line: `seconds` since the start, in which `fresh` members were computed; `running`
-  !> says what is known of the runout.
-  subroutine report(this, done, total, failed, fresh, seconds, running)
+  !> says what is known of the runout. `expected` members will have been needed in the end, of
+  !> `total` that may be.
+  subroutine report(this, done, total, expected, failed, fresh, seconds, running)
     class(progress_t), intent(in) :: this
-    integer(i8), intent(in) :: done, total, failed, fresh
+    integer(i8), intent(in) :: done, total, expected, failed, fresh
     real(wp), intent(in) :: seconds
     character(len=*), intent(in) :: running
-    character(len=:), allocatable :: rate, eta
+    character(len=:), allocatable :: rate, needed, eta, eta_seconds
 
     rate = 'unknown'
     eta = 'unknown'
+    eta_seconds = 'null'
+    needed = ''
+    if (expected < total) needed = 'about '//to_text(expected - done)//' members more, '
     if (fresh > 0 .and. seconds > 0.0_wp) then
       rate = to_text(60.0_wp*fresh/seconds, 3)//'/min'
-      eta = text_of_duration(seconds*(total - done)/fresh)
+      eta = text_of_duration(seconds*(expected - done)/fresh)
+      eta_seconds = to_text(seconds*(expected - done)/fresh, 6)
     end if
     call this%say(to_text(done)//'/'//to_text(total)//' done, '//to_text(failed)//' failed, '// &
-      rate//', ETA '//eta//running)
+      rate//', '//needed//'ETA '//eta//running)
     call this%tell('progress', '"done":'//to_text(done)//',"total":'//to_text(total)// &
-      ',"failed":'//to_text(failed)//',"seconds":'//to_text(seconds, 6))
+      ',"expected":'//to_text(expected)//',"failed":'//to_text(failed)//',"seconds":'// &
+      to_text(seconds, 6)//',"eta_seconds":'//eta_seconds)
   end subroutine report
 
   !> A log that cannot be written does not end the run: results are in the journal, whose writes are

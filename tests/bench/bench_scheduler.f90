@@ -143,10 +143,6 @@ contains
       results(k)%label = 'case_'//achar(iachar('a') + k)
       results(k)%acf = 'snx'
       results(k)%distribution = 'normal'
-      results(k)%role = 'study'
-      results(k)%varied = ''
-      results(k)%noise_case = ''
-      results(k)%control_of = ''
       call results(k)%init(int(MEMBERS_PER_CASE, i8), case_geometry_t(profile_x=[(0.125_wp*i, i=1, &
         PROFILE_COLUMNS)]))
       do id = 1, MEMBERS_PER_CASE

@@ -18,6 +18,8 @@ module synthetic_model
   type, extends(member_model_t) :: synthetic_model_t
     !> Longest delay of a member in s.
     real(wp) :: delay = 0.004_wp
+    !> Member of each case that takes a tenth of a second longer; 0 for none.
+    integer(i8) :: slow_id = 0
   contains
     procedure :: run
   end type synthetic_model_t
@@ -35,6 +37,7 @@ contains
 
     call random_number(delay)
     delay = delay*this%delay
+    if (id == this%slow_id) delay = delay + 0.1_wp
     start = wall_seconds()
     call expected_outcome(case_index, id, outcome)
     do while (wall_seconds() - start < delay)
