@@ -148,8 +148,12 @@ def controlled_probability(
         return _unknown(len(y), len(all_c))
     t = all_c.mean() + np.std(all_c, ddof=1) * (threshold - y.mean()) / spread
     got = controlled_mean(above, paired_controls(c > t, all_c > t), confidence, HALF_A_PAIR)
-    if not np.isfinite(got.value):
-        return _unknown(len(y), len(all_c))
+    if not np.isfinite(got.value):  # no member or no twin beyond, or all: the twins tell nothing
+        plain = wilson(int(above.sum()), len(y), confidence)
+        error = np.sqrt(plain.value * (1.0 - plain.value) / len(y))
+        return Estimate(
+            len(y), len(all_c), plain.value, plain.low, plain.high, error, plain.value, error, 0.0
+        )
     return _as_share(got, len(y), len(all_c), confidence)
 
 
@@ -175,7 +179,8 @@ def controlled_sd(fine, paired, everyone, confidence: float = CONFIDENCE) -> Est
     """The standard deviation, by the mean of n/(n - 1) (Y - mean(Y))^2 with (C - mean(C))^2, the
     mean of all M, as control. The interval is that of `sd_interval` with its error multiplied by
     sqrt(error^2/plain error^2) of the two second moments; error and plain error here are those of
-    the logarithm of the variance times half the value (delta method)."""
+    the logarithm of the variance times half the value (delta method). The kurtosis is the larger of
+    those of Y and of all C: a small sample seldom shows its tail."""
     y, c, all_c = (np.asarray(v, dtype=float) for v in (fine, paired, everyone))
     n = len(y)
     if n < FEWEST_FOR_SD or len(all_c) < 2:
@@ -188,7 +193,7 @@ def controlled_sd(fine, paired, everyone, confidence: float = CONFIDENCE) -> Est
     )
     if not got.value > 0.0:
         return _unknown(n, len(all_c))
-    c_factor, error = sd_error(n, kurtosis(y), confidence)
+    c_factor, error = sd_error(n, max(kurtosis(y), kurtosis(all_c)), confidence)
     shrunk = error * got.error / got.plain_error
     # c corrects the skewness of ln s^2, which shrinks with its variance.
     factor = c_factor ** (0.5 * (shrunk / error) ** 2)

@@ -288,13 +288,15 @@ def _keep_parts(file: h5py.File, parts: list, sources: list) -> None:
 
 
 def _write_rows(target: h5py.Group, groups: list) -> None:
-    """The datasets of a case, rows of all parts in the order of their ids."""
-    order = np.argsort(np.concatenate([group["id"][...] for group in groups]), kind="stable")
-    for name in _dataset_names(groups[0]):
-        source = groups[0][name]
+    """The datasets of a case, rows of all parts in the order of their ids. Parts without rows have
+    datasets without shape or type."""
+    filled = [group for group in groups if group["id"].size] or groups[:1]
+    order = np.argsort(np.concatenate([group["id"][...] for group in filled]), kind="stable")
+    for name in _dataset_names(filled[0]):
+        source = filled[0][name]
         values = source[...]
         if name != _SHARED:
-            values = np.concatenate([group[name][...] for group in groups])[order]
+            values = np.concatenate([group[name][...] for group in filled])[order]
         dataset = target.create_dataset(name, data=values, dtype=source.dtype)
         dataset.attrs.update(source.attrs)
 
