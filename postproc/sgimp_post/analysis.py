@@ -9,7 +9,6 @@ import numpy as np
 from .ensemble import RUNOUTS, STATUS_TEXTS
 from .fits import best_fit, fit_laws, rivals
 from .importance import (
-    FEWEST_BEYOND,
     effective_size,
     exceedance_quantile,
     weighted_mean,
@@ -130,7 +129,7 @@ def _weighted(case, primary: str, deterministic: float) -> dict:
     rows, seen = [], set()
     for origin, s in thresholds:
         got = weighted_probability(values, log_weights, s)
-        if not np.isfinite(s) or got.effective < FEWEST_BEYOND or s in seen:
+        if not got.is_supported or s in seen:
             continue
         seen.add(s)
         rows.append({"origin": origin, "threshold": float(s), **asdict(got)})

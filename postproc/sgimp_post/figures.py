@@ -14,7 +14,7 @@ import numpy as np
 
 from .ensemble import RUNOUTS
 from .fits import LAWS, distribution_of, fit_laws
-from .importance import FEWEST_BEYOND, weighted_probability
+from .importance import weighted_probability
 from .statistics import describe, exceedance, finite, running
 
 #: Values up to which each one has its tick below the histogram; a tick takes 230 bytes of SVG.
@@ -185,6 +185,8 @@ def _running(axis, values, tint, deterministic):
 
 def _exceedance(axis, cases, name, deterministic):
     smallest = 1.0
+    # Cases that differ in another key of the study than acf and cov: thinner and thinner lines.
+    others = list(dict.fromkeys(str(case.varied) for case in cases))
     for case in cases:
         curve = exceedance(case.values(name))
         if len(curve.x) == 0:
@@ -199,7 +201,12 @@ def _exceedance(axis, cases, name, deterministic):
             )
         dash = {0.1: "--", 0.15: ":"}.get(round(case.cov, 3), "-")
         axis.plot(
-            curve.x[drawn], curve.probability[drawn], color=tint, ls=dash, lw=1.5, label=case.label
+            curve.x[drawn],
+            curve.probability[drawn],
+            color=tint,
+            ls=dash,
+            lw=max(0.6, 1.8 - 0.5 * others.index(str(case.varied))),
+            label=case.label,
         )
     axis.set_yscale("log")
     axis.set_ylim(0.5 * smallest, 1.3)
@@ -294,7 +301,7 @@ def weighted_figure(cases, name: str, deterministic: dict):
         at = np.unique(finite(values))
         at = at[np.unique(np.linspace(0, len(at) - 1, 160).round().astype(int))]
         rows = [weighted_probability(values, log_weights, x) for x in at]
-        keep = np.array([row.effective >= FEWEST_BEYOND for row in rows], dtype=bool)
+        keep = np.array([row.is_supported for row in rows], dtype=bool)
         p, low, high = (
             np.array([getattr(row, key) for row in rows])[keep] for key in ("value", "low", "high")
         )
