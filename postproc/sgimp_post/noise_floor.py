@@ -45,9 +45,9 @@ def _floor(case, name: str) -> dict:
 
 
 def against_floor(case, homogeneous) -> dict:
-    """Of a study case, by runout: share of the variance that is soil, shift of the mean against the
-    deterministic value, P(S > deterministic value), and the share that runs farther than the
-    nominal run alone."""
+    """Of a study case, by runout: sd of the noise, share of the variance that is soil, shift of the
+    mean against the deterministic value, P(S > deterministic value), and the share that runs
+    farther than the nominal run alone."""
     return {name: _against(case, homogeneous, name) for name in RUNOUTS}
 
 
@@ -59,6 +59,7 @@ def _against(case, homogeneous, name: str) -> dict:
         nominal = finite(homogeneous.column(name)[(homogeneous.id == 1) & homogeneous.ok])
     is_counted = len(nominal) and len(values)
     return {
+        "noise_sd": describe(noise).sd,
         "soil_share": asdict(soil_share(values, noise)),
         "shift": asdict(welch_difference(values, noise)),
         "exceedance": asdict(probability_above_mean(values, noise)),

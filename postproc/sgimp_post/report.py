@@ -35,6 +35,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
     drawn = _figures(ensemble, summary)
+    tables = _tables(summary)
     html = (
         _environment()
         .get_template("report.html.j2")
@@ -49,12 +50,15 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
             laws=LAWS,
             field_unit=_field_unit(ensemble),
             pair_groups=_pair_groups(summary["pairs"]),
+            files=["members.csv", "summary.csv", "fits.csv", *tables],
             post_version=__version__,
         )
     )
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         _write_csv(output.parent, ensemble, summary)
+        for name, rows in tables.items():
+            _write_table(output.parent / name, rows)
         (output.parent / "report.json").write_text(
             json.dumps(_finite({**summary, "provenance": ensemble.attributes}), indent=1)
         )
@@ -410,6 +414,43 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
                         fit["note"],
                     ]
                 )
+
+
+def _tables(summary: dict) -> dict:
+    """Rows of the further CSV files by name; of those only that have any."""
+    tables = {
+        "noise_floor.csv": [
+            {"case": case["label"], "noise_case": case["noise_case"], "runout": name, **_flat(row)}
+            for case in summary["cases"]
+            for name, row in case["against_floor"].items()
+        ],
+        "pairs.csv": summary["pairs"],
+        "controls.csv": [
+            {"case": entry["case"], "twin": entry["twin"], **row}
+            for entry in summary["controls"]
+            for row in entry["rows"]
+        ],
+        "importance.csv": [
+            {"case": case["label"], **row} for case in summary["importance"] for row in case["rows"]
+        ],
+    }
+    return {name: rows for name, rows in tables.items() if rows}
+
+
+def _flat(row: dict, prefix: str = "") -> dict:
+    """Dictionaries within it by joined names."""
+    flat = {}
+    for key, value in row.items():
+        inner = _flat(value, f"{prefix}{key}_") if isinstance(value, dict) else None
+        flat.update({f"{prefix}{key}": value} if inner is None else inner)
+    return flat
+
+
+def _write_table(path: Path, rows: list) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def _finite(value):

@@ -144,13 +144,14 @@ def kurtosis(values) -> float:
     """n sum (x - m)^4 / (sum (x - mean)^2)^2 of five values or more that are not all equal, with
     the mean m of what is left when a share 1/(2 sqrt(n - 4)) is cut off at either end (Bonett
     2006), whole values only; infinite otherwise. Not less than 1."""
-    x = np.sort(finite(values))
+    x = finite(values)
     n = len(x)
     squares = float(np.sum((x - x.mean()) ** 2)) if n > 4 else 0.0
     if squares == 0.0:
         return np.inf
     cut = int(min(n / (2.0 * np.sqrt(n - 4.0)), (n - 1) // 2))
-    return float(n * np.sum((x - x[cut : n - cut].mean()) ** 4) / squares**2)
+    middle = np.partition(x, (cut, n - cut - 1))[cut : n - cut].mean()
+    return float(n * np.sum((x - middle) ** 4) / squares**2)
 
 
 def sd_error(n: int, kurtosis_: float, confidence: float = CONFIDENCE):

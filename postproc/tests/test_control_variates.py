@@ -184,6 +184,13 @@ def test_expected_field_mean_is_that_of_the_clipped_law(tmp_path):
     assert expected_field_means(read_ensemble(tmp_path)) == {}
 
 
+def test_exceedances_are_told_where_the_plan_draws():
+    """Ten members on either side of s; below, the weights of a shift by three deceive."""
+    xi = np.random.default_rng(6).standard_normal(1000) + 3.0
+    for s, is_supported in ((-0.3, False), (1.5, True), (4.0, True), (5.9, False)):
+        assert weighted_probability(xi, -3.0 * xi + 4.5, s).is_supported is is_supported
+
+
 def pilot(directory, r=0.95, n=60, m=300, **attributes):
     """A study case with its twin, eight times cheaper."""
     y, c, everyone = twins(9, r, n, m)
@@ -211,6 +218,31 @@ def test_allocate_plans_the_next_run(tmp_path, capsys):
     assert f"realizations = {n}, control realizations = {m}" in capsys.readouterr().out
     assert main(["allocate", str(tmp_path)]) == 0
     assert "--half-width or --hours" in capsys.readouterr().out
+
+
+def test_cases_of_a_study_share_the_numbers(tmp_path, capsys):
+    """The most that any case needs for a half-width; hours are those of both."""
+    cases, sds, rs = [{"label": "deterministic", "values": 5.0 + 0.01 * np.arange(8)}], [], []
+    for label, seed, r in (("one", 9, 0.95), ("two", 10, 0.8)):
+        y, c, everyone = twins(seed, r, 60, 300)
+        sds.append(np.std(y, ddof=1))
+        rs.append(controlled_mean(y, paired_controls(c, everyone)).correlation)
+        cases.append({"label": label, "values": y, "columns": {"seconds": np.full(60, 4.0)}})
+        cases.append(
+            {"label": f"{label}_control", "values": everyone,
+             "columns": {"seconds": np.full(300, 0.5)},
+             "more": {"role": "control", "control_of": label}}
+        )  # fmt: skip
+    write_ensemble(tmp_path, cases)
+    assert main(["allocate", str(tmp_path), "--half-width", "0.01"]) == 0
+    needed = [allocate_for_half_width(sd, r, 8.0, 0.01) for sd, r in zip(sds, rs)]
+    n, m = (max(column) for column in zip(*needed))
+    hours = 2 * (4.0 * n + 0.5 * m) / 3600.0
+    text = capsys.readouterr().out
+    assert f"realizations = {n}, control realizations = {m} in each case: {hours:.3g} core" in text
+    assert main(["allocate", str(tmp_path), "--hours", "2"]) == 0
+    n, m = (min(column) for column in zip(*(allocate_for_cost(r, 8.0, 900) for r in rs)))
+    assert f"realizations = {n}, control realizations = {m} in" in capsys.readouterr().out
 
 
 def test_a_twin_that_does_not_pay_is_told(tmp_path, capsys):

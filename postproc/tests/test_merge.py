@@ -140,6 +140,8 @@ def test_parts_become_one_directory(tmp_path, capsys):
     with h5py.File(tmp_path / "all" / "ensemble.h5") as file:
         assert [file[f"parts/{k}"].attrs["host"] for k in (1, 2)] == ["second", "node"]
         assert file["parts/2"].attrs["directory"] == one
+        assert list(file["cases/base/id"]) == list(range(1, 9))
+        assert list(file["cases/base/runout_max"]) == list(sample(3, 100)[:8])
         assert file["parts/2"].attrs["members"] == "1-4"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["all", "one", "two", "whole"]
     assert main(["report", str(tmp_path / "all")]) == 0

@@ -14,8 +14,8 @@ from scipy import stats
 from synthetic import RUNOUTS_FACTOR, sample, write_ensemble
 
 from sgimp_post.cli import main
-from sgimp_post.ensemble import Geometry
-from sgimp_post.figures import configuration_figure
+from sgimp_post.ensemble import Geometry, read_ensemble
+from sgimp_post.figures import configuration_figure, weighted_figure
 from sgimp_post.snapshots import Snapshot, State, read_snapshot
 
 HOMOGENEOUS = {"label": "deterministic", "values": sample(1, 8, 5.6, 0.05)}
@@ -393,6 +393,12 @@ def test_each_case_stands_against_its_own_noise_floor(tmp_path, capsys):
         assert got["shift"]["mean"] == pytest.approx(shift, rel=1e-9)
         assert got["exceedance"]["share"]["value"] == np.mean(case > noise.mean())
         assert got["above_nominal"] == np.mean(case > noise[0])
+    with open(tmp_path / "report" / "noise_floor.csv", newline="", encoding="utf-8") as file:
+        rows = {(row["case"], row["runout"]): row for row in csv.DictReader(file)}
+    got = numbers["cases"][3]["against_floor"]["runout_max"]
+    row = rows[cases[5]["label"], "runout_max"]
+    assert float(row["noise_sd"]) == pytest.approx(np.std(noise, ddof=1))
+    assert float(row["exceedance_share_low"]) == got["exceedance"]["share"]["low"]
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -410,6 +416,9 @@ def test_pairs_differ_in_one_thing(tmp_path, capsys):
             min(1.0, len(rows) * min(row["p_value"] for row in rows))
         )
     assert "By damping" in html
+    with open(tmp_path / "report" / "pairs.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["mean"]) for row in rows] == [pair["mean"] for pair in numbers["pairs"]]
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -464,6 +473,15 @@ def test_members_of_importance_sampling_are_never_shown_as_plain_ones(tmp_path, 
     assert len(exact) >= 4 and min(exact.values()) < 1e-4
     for row in weighted["rows"]:
         assert row["value"] == pytest.approx(exact[row["threshold"]], rel=0.5)
+
+
+def test_the_curve_of_weighted_members_is_the_exact_one(tmp_path):
+    """Within 40 %, where three standard errors of ten effective members would be 95 %."""
+    ensemble = read_ensemble(write_ensemble(tmp_path, [weighted_case()], sampling="importance"))
+    figure = weighted_figure(ensemble.cases, "runout_max", {"mean": np.nan, "sd": np.nan})
+    x, p = figure.axes[0].lines[0].get_data()
+    assert len(x) > 100 and p[-1] < 1e-5
+    assert p == pytest.approx(stats.norm.sf((x - 5.6) / 0.1), rel=0.4)
 
 
 @pytest.mark.usefixtures("no_pictures")

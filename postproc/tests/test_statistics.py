@@ -66,6 +66,9 @@ def test_interval_of_the_standard_deviation_by_hand():
     expected = np.sqrt(np.exp(np.log(c * x.var(ddof=1)) + np.array([-1, 1]) * z * error))
     assert sd_interval(x) == pytest.approx(expected, rel=1e-6)
     assert np.isnan(sd_interval(x[:7])).all()
+    # What the program's own stop rule is tested with (tests/unit/test_stop_rule.pf).
+    got = sd_interval([1, 2, 3, 30, 4, 5, 9, 8, 7, 6])
+    assert got == pytest.approx((2.8138936911560366, 30.572514973576027), rel=1e-12)
     assert sd_interval(np.full(9, 2.0)) == (0.0, 0.0)
 
 
@@ -92,6 +95,19 @@ def test_ratio_of_variances_of_normal_values_is_the_f_interval():
     assert (share.value, share.low, share.high) == pytest.approx(
         (1.0 - got.value, 1.0 - got.high, 1.0 - got.low)
     )
+
+
+def test_kurtosis_takes_degrees_of_freedom_from_the_ratio():
+    """2 n/(kurtosis - (n - 3)/(n - 1)), by hand, of a sample with a far value; 7 of the other."""
+    a, b = np.append(sample(1, 39), 8.0), sample(2, 8)
+    cut = int(40 / (2.0 * np.sqrt(36.0)))
+    middle = np.sort(a)[cut : 40 - cut].mean()
+    fourth = 40 * np.sum((a - middle) ** 4) / np.sum((a - a.mean()) ** 2) ** 2
+    freedom = 80.0 / (fourth - 37.0 / 39.0)
+    assert freedom < 6.0
+    got = variance_ratio(a, b)
+    expected = [got.value / stats.f.ppf(p, freedom, 7) for p in (0.975, 0.025)]
+    assert (got.low, got.high) == pytest.approx(expected, rel=1e-10)
 
 
 def test_exceedance_of_a_mean_that_is_not_known_exactly():
