@@ -125,7 +125,7 @@ def _weighted(case, primary: str, deterministic: float) -> dict:
     good = case.ok
     values, log_weights = case.column(primary)[good], case.column("log_weight")[good]
     thresholds = [("homogeneous mean", deterministic)]
-    thresholds += [(f"{p:g}", exceedance_quantile(values, log_weights, p)) for p in RARE]
+    thresholds += [("", exceedance_quantile(values, log_weights, p)) for p in RARE]
     rows, seen = [], set()
     for origin, s in thresholds:
         got = weighted_probability(values, log_weights, s)
