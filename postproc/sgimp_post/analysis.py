@@ -3,64 +3,58 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from itertools import combinations
 
 import numpy as np
 
 from .ensemble import RUNOUTS, STATUS_TEXTS
 from .fits import best_fit, fit_laws, rivals
-from .statistics import (
-    describe,
-    describe_pairs,
-    finite,
-    holm,
-    outlier_probability,
-    paired_difference,
-    probability_above,
-    wilson,
+from .importance import (
+    effective_size,
+    exceedance_quantile,
+    weighted_mean,
+    weighted_probability,
+    weighted_sd,
 )
+from .noise_floor import against_floor, noise_floor
+from .pairs import paired_experiments
+from .statistics import describe, describe_pairs, wilson
+from .two_level import control_estimates
 
-#: Largest number of pairs that is listed.
-MOST_PAIRS = 45
-#: The nominal run is an outlier when its prediction t statistic, judged by the other homogeneous
-#: runs, is beyond this two-sided probability.
-OUTLIER = 0.001
+#: Exceedances whose runout is looked up in a run with importance sampling.
+RARE = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
 def analyse(ensemble, primary: str) -> dict:
     """The numbers for all four runouts; fits, exceedance and pairs for the `primary` one."""
     cases = ensemble.for_statistics()
-    homogeneous = next((case for case in cases if case.is_homogeneous), None)
-    floor = {name: _noise_floor(homogeneous, name) for name in RUNOUTS}
-    studied = [case for case in cases if not case.is_homogeneous]
+    sampling = str(ensemble.attributes.get("sampling", "random"))
+    homogeneous = {case.label: case for case in cases if case.is_homogeneous}
+    floors = {label: noise_floor(case) for label, case in homogeneous.items()}
+    unknown = noise_floor(None)
+    studied = [case for case in cases if case.role == "study"]
+    plain = [] if ensemble.is_weighted else studied
+    noise = {c.label: floors.get(c.noise_case, unknown)[primary]["sd"] for c in studied}
+    means = {c.label: floors.get(c.noise_case, unknown)[primary]["mean"] for c in studied}
+    is_random = sampling in ("", "random")
     return {
         "primary": primary,
         "state": ensemble.state,
-        "sampling": str(ensemble.attributes.get("sampling", "random")),
+        "sampling": sampling,
         "complete": ensemble.is_complete,
         "totals": _totals(ensemble),
-        "deterministic": floor,
-        "cases": [_case(case, primary, floor) for case in studied],
-        "pairs": _pairs(studied, primary, floor[primary]["sd"]),
+        "deterministic": next(iter(floors.values()), unknown),
+        "floors": floors,
+        "cases": [
+            _case(case, primary, homogeneous.get(case.noise_case), ensemble.is_weighted)
+            for case in studied
+        ],
+        "pairs": paired_experiments(plain, primary, noise),
+        "controls": control_estimates(ensemble, cases, primary, means) if is_random else [],
+        "importance": [_weighted(case, primary, means[case.label]) for case in studied]
+        if ensemble.is_weighted
+        else [],
         "failures": _failures(ensemble),
         "cost": _cost(ensemble),
-    }
-
-
-def _noise_floor(case, name: str) -> dict:
-    """Mean and spread of the homogeneous members for one runout, in m; beside them the nominal run
-    and the others without it, since one far run of eight decides what the noise floor is."""
-    values = np.array([]) if case is None else case.values(name)
-    others, nominal = np.array([]), np.nan
-    if case is not None:
-        others = finite(case.column(name)[(case.id != 1) & case.ok])
-        first = finite(case.column(name)[(case.id == 1) & case.ok])
-        nominal = float(first[0]) if len(first) else np.nan
-    return {
-        "nominal": nominal,
-        "nominal_is_outlier": bool(outlier_probability(nominal, others) < OUTLIER),
-        "others": asdict(describe(others)),
-        **asdict(describe(values)),
     }
 
 
@@ -80,19 +74,23 @@ def _totals(ensemble) -> dict:
     }
 
 
-def _case(case, primary: str, floor: dict) -> dict:
-    values = case.values(primary)
-    deterministic = floor[primary]["mean"]
+def _case(case, primary: str, homogeneous, is_weighted: bool) -> dict:
+    """Plain statistics of members of importance sampling say nothing: theirs are of no values."""
+    drawn = case.select(np.zeros(case.count, dtype=bool)) if is_weighted else case
+    values = drawn.values(primary)
+    floor = noise_floor(homogeneous)[primary]
+    against = against_floor(drawn, homogeneous)
     fits = fit_laws(values)
     best = best_fit(fits)
     ok = case.ok
-    noise = floor[primary]["sd"]
-    sd = describe(values).sd
-    shift = describe(values).mean - deterministic
+    shift, noise = against[primary]["shift"]["mean"], floor["sd"]
     return {
         "label": case.label,
         "acf": case.acf,
         "cov": case.cov,
+        "varied": case.varied,
+        "noise_case": case.noise_case,
+        "stop_rule_met": case.stop_rule_met,
         "planned": case.planned,
         "done": case.count,
         "ok": int(ok.sum()),
@@ -100,15 +98,18 @@ def _case(case, primary: str, floor: dict) -> dict:
         "failed_share": asdict(wilson(int((~ok).sum()), case.count)),
         "unsettled": int((case.column("settled")[ok] == 0).sum()),
         "wall_touched": int((case.column("wall_touched")[ok] == 1).sum()),
-        "pairs_of_members": asdict(describe_pairs(case.id[ok], case.column(primary)[ok])),
-        "runouts": {name: asdict(describe(case.values(name))) for name in RUNOUTS},
-        "height_wall": asdict(describe(case.values("height_wall"))),
-        "exceedance": asdict(probability_above(values, deterministic)),
+        "pairs_of_members": asdict(
+            describe_pairs(drawn.id[drawn.ok], drawn.column(primary)[drawn.ok])
+        ),
+        "runouts": {name: asdict(describe(drawn.values(name))) for name in RUNOUTS},
+        "height_wall": asdict(describe(drawn.values("height_wall"))),
+        "against_floor": against,
+        "exceedance": against[primary]["exceedance"]["share"],
         "fits": [asdict(fit) for fit in fits],
         "best": best.law if best else "",
         "rivals": [fit.law for fit in rivals(fits)],
-        "noise_share": float((noise / sd) ** 2) if sd and sd > 0 and np.isfinite(noise) else np.nan,
-        "shift": float(shift) if np.isfinite(shift) else np.nan,
+        "noise_share": 1.0 - against[primary]["soil_share"]["value"],
+        "shift": shift,
         "shift_below_noise": bool(abs(shift) < noise) if np.isfinite(shift * noise) else False,
         "field_mean": asdict(describe(case.column("field_mean")[ok])),
         "field_min": float(np.nanmin(case.column("field_min")[ok], initial=np.inf)),
@@ -118,29 +119,28 @@ def _case(case, primary: str, floor: dict) -> dict:
     }
 
 
-def _pairs(cases: list, primary: str, noise: float) -> list:
-    """Differences between cases that share random numbers and coefficient of variation."""
-    rows = []
-    for first, second in combinations(cases, 2):
-        if first.cov != second.cov or len(rows) >= MOST_PAIRS:
+def _weighted(case, primary: str, deterministic: float) -> dict:
+    """Of a case with importance sampling: moments as far as the weights carry them, P(S > s) for
+    the deterministic value and for the runouts that are passed with the probabilities of RARE."""
+    good = case.ok
+    values, log_weights = case.column(primary)[good], case.column("log_weight")[good]
+    thresholds = [("homogeneous mean", deterministic)]
+    thresholds += [("", exceedance_quantile(values, log_weights, p)) for p in RARE]
+    rows, seen = [], set()
+    for origin, s in thresholds:
+        got = weighted_probability(values, log_weights, s)
+        if not got.is_supported or s in seen:
             continue
-        _, one, two = np.intersect1d(first.id, second.id, return_indices=True)
-        good = first.ok[one] & second.ok[two]
-        difference = paired_difference(
-            first.column(primary)[one][good], second.column(primary)[two][good]
-        )
-        below = bool(abs(difference.mean) < noise)  # False where either is not known
-        rows.append(
-            {
-                "first": first.label,
-                "second": second.label,
-                "below_noise": below,
-                **asdict(difference),
-            }
-        )
-    for row, adjusted in zip(rows, holm([row["p_value"] for row in rows])):
-        row["p_adjusted"] = float(adjusted)
-    return rows
+        seen.add(s)
+        rows.append({"origin": origin, "threshold": float(s), **asdict(got)})
+    return {
+        "label": case.label,
+        "n": len(values),
+        "effective": effective_size(log_weights),
+        "mean": asdict(weighted_mean(values, log_weights)),
+        "sd": asdict(weighted_sd(values, log_weights)),
+        "rows": rows,
+    }
 
 
 def _failures(ensemble) -> list:

@@ -18,6 +18,8 @@ def main(arguments=None) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     _add_report(commands)
     _add_fields(commands)
+    _add_allocate(commands)
+    _add_merge(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
@@ -85,5 +87,44 @@ def _add_fields(commands):
 
 def _fields(options) -> int:
     from .field_report import run
+
+    return run(options)
+
+
+def _add_allocate(commands):
+    allocate = commands.add_parser(
+        "allocate", help="how many members and twins on coarser cells to run, from a pilot"
+    )
+    allocate.add_argument(
+        "directory", type=Path, metavar="DIR", help="output directory of the pilot"
+    )
+    target = allocate.add_mutually_exclusive_group()
+    target.add_argument(
+        "--half-width", type=float, metavar="M", help="of the 95 %% interval of the mean, in m"
+    )
+    target.add_argument("--hours", type=float, metavar="H", help="core-hours of all cases together")
+    allocate.add_argument(
+        "--runout", choices=list(RUNOUTS), default="runout_max", help="definition (runout_max)"
+    )
+    allocate.set_defaults(run=_allocate)
+
+
+def _allocate(options) -> int:
+    from .allocate import run
+
+    return run(options)
+
+
+def _add_merge(commands):
+    merge = commands.add_parser(
+        "merge", help="directories of disjoint members of one configuration become one"
+    )
+    merge.add_argument("directories", type=Path, nargs="+", metavar="DIR")
+    merge.add_argument("--out", type=Path, required=True, help="the new directory")
+    merge.set_defaults(run=_merge)
+
+
+def _merge(options) -> int:
+    from .merge import run
 
     return run(options)

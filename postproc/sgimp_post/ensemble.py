@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import h5py
 import numpy as np
 
 from .errors import PostError
+from .id_ranges import parse_ids
 
 FILE_NAME = "ensemble.h5"
 
@@ -50,7 +52,37 @@ FLOAT_COLUMNS = (
     "seconds",
     "failure_x",
     "failure_y",
+    "log_weight",
 )
+
+ROLES = ("study", "homogeneous", "control")
+
+#: Between the keys of `damping=0.7, cell_size=0.25`.
+_NEXT_KEY = re.compile(r",\s*(?=[^\s,=]+\s*=)")
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Where the body stood and how large the grid is, in m; None if the file does not say."""
+
+    toe: float | None = None
+    initial_height: float | None = None
+    initial_width: float | None = None
+    x_min: float | None = None
+    x_max: float | None = None
+    y_min: float | None = None
+    y_max: float | None = None
+    cell_size: float | None = None
+    point_spacing: float | None = None
+
+    def updated(self, attributes) -> Geometry:
+        """With what these HDF5 attributes say."""
+        known = {
+            name: float(_plain(attributes[name]))
+            for name in self.__dataclass_fields__
+            if name in attributes
+        }
+        return replace(self, **known)
 
 
 @dataclass(frozen=True)
@@ -64,17 +96,31 @@ class Case:
     distribution: str
     scale_x: float
     scale_y: float
-    is_homogeneous: bool
+    #: One of ROLES.
+    role: str
+    #: Label of the homogeneous case that is the noise floor of this one; '' if it is not known.
+    noise_case: str
+    #: Label of the case whose cheap twin on coarser cells this one is, or ''.
+    control_of: str
+    #: Keys of the study beyond acf and cov, with their values as text.
+    varied: dict
     planned: int
+    #: The case was ended by its stop rule, `planned` members from the first on.
+    stop_rule_met: bool
     order: int
     id: np.ndarray
     status: np.ndarray
     columns: dict
     units: dict
     reason: list
+    geometry: Geometry = Geometry()
     #: Cell centres [nx] and deposit depth [N, nx], in m; both None if not in the file.
     profile_x: np.ndarray | None = None
     profile_height: np.ndarray | None = None
+
+    @property
+    def is_homogeneous(self) -> bool:
+        return self.role == "homogeneous"
 
     @property
     def count(self) -> int:
@@ -108,25 +154,14 @@ class Case:
             profile_height=None if self.profile_height is None else self.profile_height[keep],
         )
 
-    def prefix(self) -> Case:
-        """Rows 1, 2, ..., k without a gap. In an unfinished run the members that are still missing
-        are the slow ones; what comes after the first of them is a biased draw."""
-        return self.select(self.id == np.arange(1, self.count + 1))
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Where the body stood and how large the grid is, in m; None if the file does not say."""
-
-    toe: float | None = None
-    initial_height: float | None = None
-    initial_width: float | None = None
-    x_min: float | None = None
-    x_max: float | None = None
-    y_min: float | None = None
-    y_max: float | None = None
-    cell_size: float | None = None
-    point_spacing: float | None = None
+    def prefix(self, asked=None) -> Case:
+        """Rows from the first of the ids `asked` for (1, 2, ... if none are named) on without a
+        gap. In an unfinished run the members that are still missing are the slow ones; what comes
+        after the first of them is a biased draw."""
+        wanted = np.arange(1, self.count + 1)
+        if asked is not None:
+            wanted = np.resize(asked[: self.count], self.count)
+        return self.select(np.logical_and.accumulate(self.id == wanted))
 
 
 @dataclass(frozen=True)
@@ -145,10 +180,28 @@ class Ensemble:
     def is_complete(self) -> bool:
         return self.state == "complete"
 
+    @property
+    def asked(self):
+        """Sorted ids that were asked for in this directory; None for all."""
+        text = str(self.attributes.get("members", ""))
+        return parse_ids(text, f"{self.directory / FILE_NAME}: members") if text else None
+
+    @property
+    def is_weighted(self) -> bool:
+        """Members were drawn by importance sampling."""
+        return str(self.attributes.get("sampling", "")) == "importance"
+
+    def case(self, label: str) -> Case | None:
+        return next((case for case in self.cases if case.label == label), None)
+
     def for_statistics(self) -> list:
-        """The cases with the rows that statistics may use: all of a complete run, else the
-        contiguous prefix of each case."""
-        return list(self.cases) if self.is_complete else [case.prefix() for case in self.cases]
+        """The cases with the rows that statistics may use: all of a complete run, else those
+        without a gap from the first on. What came in after a stop rule was met does not count."""
+        cases = [
+            case.select(case.id <= case.planned) if case.stop_rule_met else case
+            for case in self.cases
+        ]
+        return cases if self.is_complete else [case.prefix(self.asked) for case in cases]
 
 
 def read_ensemble(directory: Path) -> Ensemble:
@@ -177,18 +230,17 @@ def _read_file(directory: Path, path: Path, file: h5py.File) -> Ensemble:
         raise PostError(f"{path}: not a results file of sgimp (no program='sgimp' or no /cases)")
     geometry = Geometry()
     if "geometry" in file:
-        known = {
-            name: float(value)
-            for name, value in file["geometry"].attrs.items()
-            if name in Geometry.__dataclass_fields__
-        }
-        geometry = Geometry(**known)
-    cases = [_read_case(path, label, group) for label, group in file["cases"].items()]
+        geometry = geometry.updated(file["geometry"].attrs)
+    cases = [_read_case(path, label, group, geometry) for label, group in file["cases"].items()]
+    homogeneous = [case for case in cases if case.is_homogeneous]
+    if len(homogeneous) == 1:  # files of earlier versions do not name it
+        label = homogeneous[0].label
+        cases = [replace(case, noise_case=case.noise_case or label) for case in cases]
     cases.sort(key=lambda case: (case.order, case.label))
     return Ensemble(directory, attributes, geometry, cases)
 
 
-def _read_case(path: Path, label: str, group: h5py.Group) -> Case:
+def _read_case(path: Path, label: str, group: h5py.Group, geometry: Geometry) -> Case:
     for name in ("id", "status"):
         if name not in group:
             raise PostError(f"{path}: case {label} has no dataset {name}")
@@ -202,7 +254,8 @@ def _read_case(path: Path, label: str, group: h5py.Group) -> Case:
             values = _column(path, label, group[name], count)
             units[name] = str(_plain(group[name].attrs.get("units", "")))
         else:
-            values = np.full(count, -1 if is_integer else np.nan)
+            missing = 0.0 if name == "log_weight" else np.nan
+            values = np.full(count, -1 if is_integer else missing)
             units[name] = ""
         columns[name] = values.astype(np.int64 if is_integer else np.float64)[order]
     reason = [""] * count
@@ -210,6 +263,10 @@ def _read_case(path: Path, label: str, group: h5py.Group) -> Case:
         reason = [_plain(text) for text in _column(path, label, group["reason"], count)]
     x, height = _read_profile(path, label, group, count)
     attributes = {name: _plain(value) for name, value in group.attrs.items()}
+    is_homogeneous = bool(attributes.get("is_homogeneous", label == "deterministic"))
+    role = str(attributes.get("role", "homogeneous" if is_homogeneous else "study"))
+    if role not in ROLES:
+        raise PostError(f"{path}: case {label} has the role '{role}' (known: {', '.join(ROLES)})")
     return Case(
         label=label,
         acf=str(attributes.get("acf", "")).lower(),
@@ -218,17 +275,28 @@ def _read_case(path: Path, label: str, group: h5py.Group) -> Case:
         distribution=str(attributes.get("distribution", "")),
         scale_x=float(attributes.get("scale_x", np.nan)),
         scale_y=float(attributes.get("scale_y", np.nan)),
-        is_homogeneous=bool(attributes.get("is_homogeneous", label == "deterministic")),
+        role=role,
+        noise_case=str(attributes.get("noise_case", "")),
+        control_of=str(attributes.get("control_of", "")),
+        varied=_varied(str(attributes.get("varied", ""))),
         planned=int(attributes.get("planned", count)),
+        stop_rule_met=bool(attributes.get("stop_rule_met", 0)),
         order=int(attributes.get("order", 0)),
         id=ids[order],
         status=_column(path, label, group["status"], count).astype(np.int64)[order],
         columns=columns,
         units=units,
         reason=[reason[k] for k in order],
+        geometry=geometry.updated(group.attrs),
         profile_x=x,
         profile_height=None if height is None else height[order],
     )
+
+
+def _varied(text: str) -> dict:
+    """`damping=0.7, cell_size=0.25` by key."""
+    pairs = (part.partition("=") for part in _NEXT_KEY.split(text) if part.strip())
+    return {key.strip(): value.strip() for key, _, value in pairs}
 
 
 def _column(path: Path, label: str, dataset: h5py.Dataset, count: int) -> np.ndarray:
@@ -258,6 +326,8 @@ def _read_profile(path: Path, label: str, group: h5py.Group, count: int):
 
 def _plain(value):
     """Attribute values as Python's own; strings without the blanks Fortran pads with."""
+    if isinstance(value, h5py.Empty):
+        return ""
     if isinstance(value, np.ndarray):
         value = value.reshape(-1)
         if len(value) != 1:

@@ -14,7 +14,8 @@ import numpy as np
 
 from .ensemble import RUNOUTS
 from .fits import LAWS, distribution_of, fit_laws
-from .statistics import describe, exceedance, running
+from .importance import weighted_probability
+from .statistics import describe, exceedance, finite, running
 
 #: Values up to which each one has its tick below the histogram; a tick takes 230 bytes of SVG.
 MOST_TICKS = 200
@@ -184,6 +185,8 @@ def _running(axis, values, tint, deterministic):
 
 def _exceedance(axis, cases, name, deterministic):
     smallest = 1.0
+    # Cases that differ in another key of the study than acf and cov: thinner and thinner lines.
+    others = list(dict.fromkeys(str(case.varied) for case in cases))
     for case in cases:
         curve = exceedance(case.values(name))
         if len(curve.x) == 0:
@@ -198,7 +201,12 @@ def _exceedance(axis, cases, name, deterministic):
             )
         dash = {0.1: "--", 0.15: ":"}.get(round(case.cov, 3), "-")
         axis.plot(
-            curve.x[drawn], curve.probability[drawn], color=tint, ls=dash, lw=1.5, label=case.label
+            curve.x[drawn],
+            curve.probability[drawn],
+            color=tint,
+            ls=dash,
+            lw=max(0.6, 1.8 - 0.5 * others.index(str(case.varied))),
+            label=case.label,
         )
     axis.set_yscale("log")
     axis.set_ylim(0.5 * smallest, 1.3)
@@ -259,6 +267,54 @@ def study_figure(summary: dict):
     return figure
 
 
+@styled
+def soil_figure(summary: dict):
+    """Share of the variance that is soil, of each case by each definition of the runout."""
+    cases = summary["cases"]
+    figure, axes = plt.subplots(
+        1, len(RUNOUTS), figsize=(11.5, 0.9 + 0.22 * len(cases)), sharex=True, sharey=True
+    )
+    y = -np.arange(len(cases))
+    for axis, (name, words) in zip(axes, RUNOUTS.items()):
+        shares = [case["against_floor"][name]["soil_share"] for case in cases]
+        value, low, high = (
+            np.clip([share[key] for share in shares], 0.0, 1.0) for key in ("value", "low", "high")
+        )
+        tints = [ACF_COLOURS.get(case["acf"], OTHER) for case in cases]
+        axis.hlines(y, low, high, color=tints, lw=2.2, alpha=0.55)
+        axis.scatter(value, y, color=tints, s=18, zorder=3)
+        axis.set_title(words)
+        axis.set_xlabel("share of the variance")
+    axes[0].set_yticks(y, [case["label"] for case in cases])
+    axes[0].set_xlim(-0.02, 1.02)
+    axes[0].set_ylim(0.6 - len(cases), 0.6)
+    return figure
+
+
+@styled
+def weighted_figure(cases, name: str, deterministic: dict):
+    """P(runout > x) from the weights of importance sampling, where enough members lie beyond x."""
+    figure, axis = plt.subplots(figsize=(8.4, 4.2))
+    for case in cases:
+        good = case.ok
+        values, log_weights = case.column(name)[good], case.column("log_weight")[good]
+        at = np.unique(finite(values))
+        at = at[np.unique(np.linspace(0, len(at) - 1, 160).round().astype(int))]
+        rows = [weighted_probability(values, log_weights, x) for x in at]
+        keep = np.array([row.is_supported for row in rows], dtype=bool)
+        p, low, high = (
+            np.array([getattr(row, key) for row in rows])[keep] for key in ("value", "low", "high")
+        )
+        axis.fill_between(at[keep], low, high, color=colour(case), alpha=0.15, lw=0)
+        axis.plot(at[keep], p, color=colour(case), lw=1.5, label=case.label)
+    axis.set_yscale("log")
+    axis.set_ylabel("P(runout > x), 95 %")
+    axis.set_xlabel(f"runout, {RUNOUTS[name]} [m]")
+    _mark_deterministic(axis, deterministic)
+    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
 def _depths(case) -> np.ndarray:
     """Depths of the members that did not fail, as far as they are known."""
     if case.profile_height is None:
@@ -268,7 +324,7 @@ def _depths(case) -> np.ndarray:
 
 
 @styled
-def profile_figure(cases, geometry):
+def profile_figure(cases):
     """Depth of the final deposit: median with the band from 5 to 95 % of the members."""
     shown = [case for case in cases if len(_depths(case))]
     if not shown:
@@ -286,8 +342,8 @@ def profile_figure(cases, geometry):
         axis.plot(x, middle, color=colour(case), lw=1.4, label="median")
         reach = max(reach, x[high > 0].max() if (high > 0).any() else 0.0)
         axis.set_title(case.label)
-        if geometry.toe is not None:
-            axis.axvline(geometry.toe, color=INK, lw=0.8, ls=":")
+        if case.geometry.toe is not None:
+            axis.axvline(case.geometry.toe, color=INK, lw=0.8, ls=":")
     for axis in axes.flat[len(shown) :]:
         axis.axis("off")
     axes[0, 0].set_xlim(shown[0].profile_x[0], 1.05 * reach + 0.1)

@@ -169,7 +169,7 @@ class RandomFields:
 
     @property
     def cases(self) -> list:
-        return [case for case in self.ensemble.cases if not case.is_homogeneous]
+        return [case for case in self.ensemble.cases if case.role == "study"]
 
     @property
     def has_data(self) -> bool:

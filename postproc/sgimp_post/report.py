@@ -16,6 +16,7 @@ from .ensemble import FLOAT_COLUMNS, INTEGER_COLUMNS, RUNOUTS, STATUS_TEXTS, rea
 from .errors import PostError
 from .field_figures import UNIT_TEXTS
 from .fits import LAWS
+from .noise_floor import noise_floor
 from .snapshots import find_snapshots, read_snapshot
 
 #: Snapshots that are shown: the first of each case, at most so many; homogeneous ground first, then
@@ -23,6 +24,9 @@ from .snapshots import find_snapshots, read_snapshot
 MOST_CONFIGURATIONS = 6
 #: Cases whose own figure is shown.
 MOST_CASES = 15
+#: Rows of paired differences that are shown of each kind, those of the smallest p first if there
+#: are more; report.json has them all.
+MOST_PAIRS = 45
 
 
 def write_report(directory: Path, output: Path | None = None, primary: str = "runout_max") -> Path:
@@ -31,6 +35,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
     drawn = _figures(ensemble, summary)
+    tables = _tables(summary)
     html = (
         _environment()
         .get_template("report.html.j2")
@@ -44,12 +49,16 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
             runouts=RUNOUTS,
             laws=LAWS,
             field_unit=_field_unit(ensemble),
+            pair_groups=_pair_groups(summary["pairs"]),
+            files=["members.csv", "summary.csv", "fits.csv", *tables],
             post_version=__version__,
         )
     )
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         _write_csv(output.parent, ensemble, summary)
+        for name, rows in tables.items():
+            _write_table(output.parent / name, rows)
         (output.parent / "report.json").write_text(
             json.dumps(_finite({**summary, "provenance": ensemble.attributes}), indent=1)
         )
@@ -64,22 +73,12 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
 
 def verdict(summary: dict) -> list:
     """The answer in sentences: how many, how far, how sure, against what."""
-    totals, name = summary["totals"], summary["primary"]
-    floor = summary["deterministic"][name]
+    totals = summary["totals"]
     lines = [
         f"{totals['ok']} members ok, {totals['failed']} failed, {totals['unsettled']} not at rest"
         f" at the end, of {totals['planned']} planned."
     ]
-    if math.isfinite(floor["mean"]):
-        line = f"Homogeneous ground: {floor['mean']:.3f} m ({RUNOUTS[name]})"
-        if math.isfinite(floor["sd"]):
-            line += (
-                f", mean of {floor['n']} runs with a noise floor of {floor['sd']:.3f} m;"
-                " the nominal run "
-            )
-            is_known = math.isfinite(floor["nominal"])
-            line += f"alone gives {floor['nominal']:.3f} m" if is_known else "has no result"
-        lines.append(line + ".")
+    lines += _homogeneous_sentences(summary)
     for case in summary["cases"][:3] if len(summary["cases"]) <= 3 else []:
         lines.append(_case_sentence(case, summary))
     if len(summary["cases"]) > 3:
@@ -93,8 +92,35 @@ def verdict(summary: dict) -> list:
     return lines
 
 
+def _homogeneous_sentences(summary: dict) -> list:
+    name, floors = summary["primary"], summary["floors"]
+    known = [f[name] for f in floors.values() if math.isfinite(f[name]["mean"])]
+    if len(floors) > 1 and known:
+        means, spreads = ([f[key] for f in known] for key in ("mean", "sd"))
+        return [
+            f"Homogeneous ground, {len(known)} cases: means from {min(means):.3f} m to"
+            f" {max(means):.3f} m ({RUNOUTS[name]}), noise floors of {min(spreads):.3f} m to"
+            f" {max(spreads):.3f} m."
+        ]
+    if not known:
+        return []
+    floor = known[0]
+    line = f"Homogeneous ground: {floor['mean']:.3f} m ({RUNOUTS[name]})"
+    if math.isfinite(floor["sd"]):
+        line += (
+            f", mean of {floor['n']} runs with a noise floor of {floor['sd']:.3f} m;"
+            " the nominal run "
+        )
+        is_known = math.isfinite(floor["nominal"])
+        line += f"alone gives {floor['nominal']:.3f} m" if is_known else "has no result"
+    return [line + "."]
+
+
 def _case_sentence(case: dict, summary: dict) -> str:
     runout, share = case["runouts"][summary["primary"]], case["exceedance"]
+    weighted = next((w for w in summary["importance"] if w["label"] == case["label"]), None)
+    if weighted:
+        return _weighted_sentence(weighted)
     if runout["n"] == 0:
         return f"{case['label']}: no member has ended well yet."
     text = f"{case['label']}: mean {runout['mean']:.3f} m"
@@ -113,9 +139,22 @@ def _case_sentence(case: dict, summary: dict) -> str:
     return text + "."
 
 
+def _weighted_sentence(weighted: dict) -> str:
+    text = f"{weighted['label']}: {weighted['n']} weighted members"
+    if not weighted["rows"]:
+        return text + ", too few beyond any runout to tell its probability."
+    row = min(weighted["rows"], key=lambda row: row["value"])
+    return (
+        f"{text}; P(runout > {row['threshold']:.3f} m) = {row['value']:.2g}"
+        f" (95 %: {row['low']:.2g} to {row['high']:.2g})."
+    )
+
+
 def _study_sentence(summary: dict) -> str:
     name = summary["primary"]
     rows = [case for case in summary["cases"] if case["runouts"][name]["n"]]
+    if summary["importance"]:
+        return " ".join(_weighted_sentence(weighted) for weighted in summary["importance"][:3])
     if not rows:
         return "No heterogeneous member has ended well yet."
     means = [case["runouts"][name]["mean"] for case in rows]
@@ -128,6 +167,19 @@ def _study_sentence(summary: dict) -> str:
             " farther than homogeneous ground"
         )
     return text + "."
+
+
+def _pair_groups(pairs: list) -> list:
+    """(what differs, rows to show, number of all rows) of each kind of paired difference."""
+    groups = {}
+    for pair in pairs:
+        groups.setdefault(pair["by"], []).append(pair)
+    shown = []
+    for by, rows in groups.items():
+        kept = sorted(rows, key=lambda row: row["p_value"] if row["n"] > 1 else 2.0)[:MOST_PAIRS]
+        kept = rows if len(rows) <= MOST_PAIRS else kept
+        shown.append((by.replace("_", " "), kept, len(rows)))
+    return shown
 
 
 def _field_unit(ensemble) -> str:
@@ -145,11 +197,17 @@ def warnings(summary: dict) -> list:
             " gap"
             f" from the first on, of {totals['done']} done."
         )
-    if summary["sampling"] != "random":
+    if summary["sampling"] == "importance":
+        found.append(
+            "Importance sampling: members are drawn where the event is, not as often as nature"
+            " draws them. Plain means, spreads, histograms and counts of such members mean nothing"
+            " and are left out; what is told weighs each member."
+        )
+    elif summary["sampling"] not in ("", "random"):
         found.append(
             f"The sampling plan is {summary['sampling'].replace('_', ' ')}: members are not"
             " independent, and the intervals and p values here, which take them to be, do not hold"
-            " for means and exceedance (mostly they are too wide)."
+            " for means and exceedance (mostly they are too wide). Control variates are left out."
         )
     if summary["sampling"] == "antithetic":
         means = [
@@ -169,13 +227,25 @@ def warnings(summary: dict) -> list:
         found.append(
             f"{totals['wall_touched']} members touched a wall; it may have cut their runout short."
         )
-    floor = summary["deterministic"][summary["primary"]]
-    if floor["nominal_is_outlier"]:
+    ended = [case["label"] for case in summary["cases"] if case["stop_rule_met"]]
+    if ended:
         found.append(
-            f"The nominal homogeneous run ({floor['nominal']:.3f} m) lies far outside the other"
-            f" {floor['others']['n']} ({floor['others']['mean']:.3f} ± {floor['others']['sd']:.3f}"
-            f" m). It alone makes up most of the noise floor of {floor['sd']:.3f} m: more"
-            " homogeneous members (noise_members) are needed before a spread is called noise."
+            "The stop rule ended "
+            + ", ".join(ended)
+            + ": an interval that is looked at until it is"
+            " short enough holds a little less often than it says."
+        )
+    name = summary["primary"]
+    for label, floor in ((label, floor[name]) for label, floor in summary["floors"].items()):
+        if not floor["nominal_is_outlier"]:
+            continue
+        which = "" if len(summary["floors"]) == 1 else f" of {label}"
+        found.append(
+            f"The nominal homogeneous run{which} ({floor['nominal']:.3f} m) lies far outside the"
+            f" other {floor['others']['n']} ({floor['others']['mean']:.3f} ±"
+            f" {floor['others']['sd']:.3f} m). It alone makes up most of the noise floor of"
+            f" {floor['sd']:.3f} m: more homogeneous members (noise_members) are needed before a"
+            " spread is called noise."
         )
     inside = [case["label"] for case in summary["cases"] if case["shift_below_noise"]]
     if inside:
@@ -184,12 +254,12 @@ def warnings(summary: dict) -> list:
             + ", ".join(inside)
             + ". Such a difference is not a finding."
         )
-    pairs = [pair for pair in summary["pairs"] if pair["n"]]
+    pairs = [pair for pair in summary["pairs"] if pair["n"] and pair["by"] == "acf"]
     if pairs and all(pair["below_noise"] for pair in pairs):
         found.append(
             "All paired differences between autocorrelation functions are smaller than the noise"
             f" floor (largest {max(abs(pair['mean']) for pair in pairs):.3f} m against"
-            f" {floor['sd']:.3f} m)."
+            f" {max(pair['noise'] for pair in pairs):.3f} m)."
         )
     noisy = [case for case in summary["cases"] if case["noise_share"] > 0.5]
     if noisy:
@@ -197,10 +267,13 @@ def warnings(summary: dict) -> list:
             "More than half of the variance of the runout is discretisation noise in: "
             + ", ".join(case["label"] for case in noisy)
         )
-        if floor["nominal_is_outlier"]:
-            spreads = [case["runouts"][summary["primary"]]["sd"] for case in noisy]
-            share = 100.0 * (floor["others"]["sd"] / min(spreads)) ** 2
-            line += f". Without the nominal homogeneous run it is at most {share:.0f} %"
+        floors = [summary["floors"].get(case["noise_case"]) for case in noisy]
+        if all(floor and floor[name]["nominal_is_outlier"] for floor in floors):
+            share = max(
+                (floor[name]["others"]["sd"] / case["runouts"][name]["sd"]) ** 2
+                for floor, case in zip(floors, noisy)
+            )
+            line += f". Without the nominal homogeneous run it is at most {100.0 * share:.0f} %"
         found.append(line + ".")
     return found
 
@@ -208,23 +281,32 @@ def warnings(summary: dict) -> list:
 def _figures(ensemble, summary: dict) -> dict:
     """Data URIs by the names of the template; None or empty where there is nothing to draw."""
     name = summary["primary"]
-    floor = summary["deterministic"][name]
-    cases = [case for case in ensemble.for_statistics() if not case.is_homogeneous]
+    floors = {label: floor[name] for label, floor in summary["floors"].items()}
+    unknown = noise_floor(None)[name]
+    shared = next(iter(floors.values())) if len(floors) == 1 else unknown
+    cases = [case for case in ensemble.for_statistics() if case.role == "study"]
     drawn = [case for case in cases if len(case.values(name))]
-    covs = {case.cov for case in drawn}
+    plain = [] if ensemble.is_weighted else drawn
+    covs = {case.cov for case in plain}
+    is_by_cov = len(covs) > 1 and not any(case.varied for case in plain)
     profile = figures.profile_figure(
-        cases or [case for case in ensemble.cases if case.is_homogeneous], ensemble.geometry
+        (plain if ensemble.is_weighted else cases)
+        or [case for case in ensemble.cases if case.is_homogeneous]
     )
     return {
         "case_figures": {
-            case.label: figures.data_uri(figures.case_figure(case, name, floor))
-            for case in drawn[:MOST_CASES]
+            case.label: figures.data_uri(
+                figures.case_figure(case, name, floors.get(case.noise_case, unknown))
+            )
+            for case in plain[:MOST_CASES]
         },
-        "comparison": figures.data_uri(figures.comparison_figure(drawn, name, floor))
-        if len(drawn) > 1
+        "comparison": figures.data_uri(figures.comparison_figure(plain, name, shared))
+        if len(plain) > 1
         else None,
-        "study": figures.data_uri(figures.study_figure(summary))
-        if len(drawn) > 1 and len(covs) > 1
+        "study": figures.data_uri(figures.study_figure(summary)) if is_by_cov else None,
+        "soil": figures.data_uri(figures.soil_figure(summary)) if len(plain) > 1 else None,
+        "weighted": figures.data_uri(figures.weighted_figure(drawn, name, shared))
+        if ensemble.is_weighted and drawn
         else None,
         "profiles": figures.data_uri(profile) if profile else None,
         "configurations": _configurations(ensemble),
@@ -242,7 +324,7 @@ def _configurations(ensemble) -> list:
         if label in labels or len(shown) >= MOST_CONFIGURATIONS:
             continue
         snapshot = read_snapshot(label, member, path)
-        figure = snapshot and figures.configuration_figure(snapshot, ensemble.geometry)
+        figure = snapshot and figures.configuration_figure(snapshot, ensemble.case(label).geometry)
         if figure:
             labels.add(label)
             shown.append(
@@ -259,6 +341,8 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
     )
     environment.filters["number"] = _number
+    environment.filters["share"] = lambda value: _number(100.0 * max(value, 0.0), 0)
+    environment.filters["scientific"] = _scientific
     environment.filters["percent"] = lambda value: _number(100.0 * value, 1)
     return environment
 
@@ -268,6 +352,13 @@ def _number(value, digits: int = 3) -> str:
     if value is None or not math.isfinite(value):
         return "–"
     return f"{value:.{digits}f}"
+
+
+def _scientific(value) -> str:
+    """A probability for a table, two digits."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.2g}" if value >= 1e-3 or value == 0.0 else f"{value:.1e}"
 
 
 def _write_csv(directory: Path, ensemble, summary: dict) -> None:
@@ -295,7 +386,7 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
             "p95",
         )
         writer.writerow(["case", "runout", *statistics])
-        rows = [("deterministic", summary["deterministic"])]
+        rows = list(summary["floors"].items()) or [("deterministic", summary["deterministic"])]
         rows += [(case["label"], case["runouts"]) for case in summary["cases"]]
         for label, runouts in rows:
             for name in RUNOUTS:
@@ -323,6 +414,43 @@ def _write_csv(directory: Path, ensemble, summary: dict) -> None:
                         fit["note"],
                     ]
                 )
+
+
+def _tables(summary: dict) -> dict:
+    """Rows of the further CSV files by name; of those only that have any."""
+    tables = {
+        "noise_floor.csv": [
+            {"case": case["label"], "noise_case": case["noise_case"], "runout": name, **_flat(row)}
+            for case in summary["cases"]
+            for name, row in case["against_floor"].items()
+        ],
+        "pairs.csv": summary["pairs"],
+        "controls.csv": [
+            {"case": entry["case"], "twin": entry["twin"], **row}
+            for entry in summary["controls"]
+            for row in entry["rows"]
+        ],
+        "importance.csv": [
+            {"case": case["label"], **row} for case in summary["importance"] for row in case["rows"]
+        ],
+    }
+    return {name: rows for name, rows in tables.items() if rows}
+
+
+def _flat(row: dict, prefix: str = "") -> dict:
+    """Dictionaries within it by joined names."""
+    flat = {}
+    for key, value in row.items():
+        inner = _flat(value, f"{prefix}{key}_") if isinstance(value, dict) else None
+        flat.update({f"{prefix}{key}": value} if inner is None else inner)
+    return flat
+
+
+def _write_table(path: Path, rows: list) -> None:
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def _finite(value):

@@ -8,12 +8,14 @@ import numpy as np
 from scipy import stats
 
 CONFIDENCE = 0.95
+#: Fewest values for an interval of the standard deviation.
+FEWEST_FOR_SD = 8
 
 
 @dataclass(frozen=True)
 class Description:
-    """Of one sample. Interval of the mean by Student's t, of the standard deviation by chi-square
-    (exact for normal values, too narrow for heavy tails)."""
+    """Of one sample. Interval of the mean by Student's t, of the standard deviation by
+    `sd_interval`."""
 
     n: int
     mean: float
@@ -45,6 +47,15 @@ class Proportion:
 
 
 @dataclass(frozen=True)
+class Ratio:
+    value: float
+    low: float
+    high: float
+    normal_low: float
+    normal_high: float
+
+
+@dataclass(frozen=True)
 class Difference:
     """A difference of means with its t interval and the two-sided p value against zero."""
 
@@ -53,6 +64,19 @@ class Difference:
     low: float
     high: float
     p_value: float
+
+
+@dataclass(frozen=True)
+class ExceedanceOfMean:
+    """P(S > m) where m is itself the mean of a few runs. `share` is counted against that mean as if
+    it were exact; `at_high` and `at_low` are the shares above the two ends of its t interval;
+    `low`, `high` is the interval with both uncertainties."""
+
+    share: Proportion
+    at_high: float
+    at_low: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -98,7 +122,7 @@ def describe(values, confidence: float = CONFIDENCE) -> Description:
         return Description(0, *[np.nan] * 11)
     mean, sd = float(np.mean(x)), (float(np.std(x, ddof=1)) if n > 1 else np.nan)
     half = _t_factor(n, confidence) * sd / np.sqrt(n)
-    low, high = _sd_factors(n, confidence)
+    low, high = sd_interval(x, confidence)
     p05, median, p95 = (float(q) for q in np.percentile(x, [5, 50, 95]))
     return Description(
         n,
@@ -106,8 +130,8 @@ def describe(values, confidence: float = CONFIDENCE) -> Description:
         mean - half,
         mean + half,
         sd,
-        sd * low,
-        sd * high,
+        low,
+        high,
         float(x.min()),
         p05,
         median,
@@ -116,10 +140,69 @@ def describe(values, confidence: float = CONFIDENCE) -> Description:
     )
 
 
+def kurtosis(values) -> float:
+    """n sum (x - m)^4 / (sum (x - mean)^2)^2 of five values or more that are not all equal, with
+    the mean m of what is left when a share 1/(2 sqrt(n - 4)) is cut off at either end (Bonett
+    2006), whole values only; infinite otherwise. Not less than 1."""
+    x = finite(values)
+    n = len(x)
+    squares = float(np.sum((x - x.mean()) ** 2)) if n > 4 else 0.0
+    if squares == 0.0:
+        return np.inf
+    cut = int(min(n / (2.0 * np.sqrt(n - 4.0)), (n - 1) // 2))
+    middle = np.partition(x, (cut, n - cut - 1))[cut : n - cut].mean()
+    return float(n * np.sum((x - middle) ** 4) / squares**2)
+
+
+def sd_error(n: int, kurtosis_: float, confidence: float = CONFIDENCE):
+    """(c, standard error of ln s^2) of Bonett (2006): c = n/(n - z),
+    error = c sqrt((kurtosis - (n - 3)/n)/(n - 1))."""
+    c = n / (n - _z(confidence))
+    return c, c * np.sqrt((kurtosis_ - (n - 3.0) / n) / (n - 1.0))
+
+
+def sd_interval(values, confidence: float = CONFIDENCE):
+    """Interval of the standard deviation of values of any law with a fourth moment:
+    exp(ln(c s^2) +- z error), of variances (Bonett, Approximate confidence interval for standard
+    deviation of nonnormal distributions, Computational Statistics & Data Analysis 50, 2006,
+    775-782). NaN for fewer than FEWEST_FOR_SD values; no width where all are equal."""
+    x = finite(values)
+    n = len(x)
+    if n < FEWEST_FOR_SD:
+        return np.nan, np.nan
+    sd = float(np.std(x, ddof=1))
+    if np.ptp(x) == 0.0:
+        return sd, sd
+    c, error = sd_error(n, kurtosis(x), confidence)
+    half = 0.5 * _z(confidence) * error
+    return float(sd * np.sqrt(c) * np.exp(-half)), float(sd * np.sqrt(c) * np.exp(half))
+
+
+def variance_ratio(first, second, confidence: float = CONFIDENCE) -> Ratio:
+    """var(first)/var(second) of independent samples. `low`, `high`: by the F distribution with the
+    degrees of freedom d = 2 n/(kurtosis - (n - 3)/(n - 1)) that the kurtosis of a sample leaves it,
+    n - 1 at most (after Shoemaker, Fixing the F test for equal variances, The American Statistician
+    57, 2003, 105-114); `normal_low`, `normal_high`: with n - 1, exact for normal values alone."""
+    a, b = finite(first), finite(second)
+    if len(a) < 2 or len(b) < 2 or np.ptp(b) == 0.0:
+        return Ratio(*[np.nan] * 5)
+    value = float(np.var(a, ddof=1) / np.var(b, ddof=1))
+    bounds = []
+    for d, e in ((_freedom(a), _freedom(b)), (len(a) - 1, len(b) - 1)):
+        bounds += [value / stats.f.ppf(0.5 + 0.5 * sign * confidence, d, e) for sign in (1, -1)]
+    return Ratio(value, *map(float, bounds))
+
+
+def _freedom(x) -> float:
+    n = len(x)
+    excess = kurtosis(x) - (n - 3.0) / (n - 1.0)
+    return min(n - 1.0, 2.0 * n / excess) if np.isfinite(excess) else n - 1.0
+
+
 def wilson(count: int, n: int, confidence: float = CONFIDENCE) -> Proportion:
     if n == 0:
         return Proportion(0, 0, np.nan, np.nan, np.nan)
-    z2 = float(stats.norm.ppf(0.5 + 0.5 * confidence)) ** 2
+    z2 = _z(confidence) ** 2
     centre = (count + 0.5 * z2) / (n + z2)
     half = float(np.sqrt(z2 * (count * (n - count) / n + 0.25 * z2))) / (n + z2)
     low = centre - half if count > 0 else 0.0  # exact at the ends, where rounding would show
@@ -133,6 +216,27 @@ def probability_above(values, threshold: float, confidence: float = CONFIDENCE) 
     if not np.isfinite(threshold):
         return wilson(0, 0)
     return wilson(int(np.count_nonzero(x > threshold)), len(x), confidence)
+
+
+def probability_above_mean(values, reference, confidence: float = CONFIDENCE) -> ExceedanceOfMean:
+    """P(S > mean of the law of `reference`). The two distances of each end, Wilson's and that of
+    the threshold, are added as squares (the MOVER of Zou and Donner, Statistics in Medicine 27,
+    2008, 1693-1702)."""
+    x, mean = finite(values), describe(reference, confidence)
+    share = probability_above(x, mean.mean, confidence)
+    if not share.n or not np.isfinite(mean.mean_high):
+        return ExceedanceOfMean(share, *[np.nan] * 4)
+    at_high, at_low = (float(np.mean(x > end)) for end in (mean.mean_high, mean.mean_low))
+    low = share.value - np.hypot(share.value - share.low, share.value - at_high)
+    high = share.value + np.hypot(share.high - share.value, at_low - share.value)
+    return ExceedanceOfMean(share, at_high, at_low, max(0.0, float(low)), min(1.0, float(high)))
+
+
+def soil_share(values, noise, confidence: float = CONFIDENCE) -> Ratio:
+    """Share of the variance of `values` that is not that of `noise`: 1 - var(noise)/var(values),
+    with the intervals of `variance_ratio`. Below zero where the noise spreads more."""
+    r = variance_ratio(noise, values, confidence)
+    return Ratio(1.0 - r.value, 1.0 - r.high, 1.0 - r.low, 1.0 - r.normal_high, 1.0 - r.normal_low)
 
 
 def paired_difference(first, second, confidence: float = CONFIDENCE) -> Difference:
@@ -214,10 +318,8 @@ def running(values, confidence: float = CONFIDENCE, points: int = 240) -> Runnin
         variance = np.maximum(squares - count * mean**2, 0.0) / (count - 1)
         sd = np.where(count > 1, np.sqrt(variance), np.nan)
         half = _t_factor(count, confidence) * sd / np.sqrt(count)
-        low, high = _sd_factors(count, confidence)
-    return Running(
-        count, mean + shift, mean + shift - half, mean + shift + half, sd, sd * low, sd * high
-    )
+    low, high = np.array([sd_interval(x[:k], confidence) for k in count]).T
+    return Running(count, mean + shift, mean + shift - half, mean + shift + half, sd, low, high)
 
 
 def exceedance(values, confidence: float = CONFIDENCE, points: int = 160) -> Exceedance:
@@ -246,9 +348,5 @@ def _t_factor(n, confidence: float):
     return float(factor) if factor.ndim == 0 else factor
 
 
-def _sd_factors(n, confidence: float):
-    """Factors on the standard deviation that give its interval."""
-    freedom = np.where(np.asarray(n) > 1, np.asarray(n, dtype=float) - 1, np.nan)
-    low = np.sqrt(freedom / stats.chi2.ppf(0.5 + 0.5 * confidence, freedom))
-    high = np.sqrt(freedom / stats.chi2.ppf(0.5 - 0.5 * confidence, freedom))
-    return (float(low), float(high)) if np.ndim(n) == 0 else (low, high)
+def _z(confidence: float) -> float:
+    return float(stats.norm.ppf(0.5 + 0.5 * confidence))

@@ -8,9 +8,10 @@ from sgimp_post.ensemble import FLOAT_COLUMNS, INTEGER_COLUMNS, RUNOUTS
 COLUMNS_X = 40
 
 
-def write_ensemble(directory, cases, state="complete", snapshots=()):
+def write_ensemble(directory, cases, state="complete", snapshots=(), **attributes):
     """`cases`: dictionaries with label, values (farthest point, m) and, if wanted, ids,
-    failed (ids), planned, acf, cov; the first may be the homogeneous one."""
+    failed (ids), planned, acf, cov, columns ({name: values}) and further attributes of the case
+    (more); the first may be the homogeneous one. `attributes` are those of the root."""
     directory.mkdir(parents=True, exist_ok=True)
     with h5py.File(directory / "ensemble.h5", "w") as file:
         file.attrs.update(
@@ -29,6 +30,7 @@ def write_ensemble(directory, cases, state="complete", snapshots=()):
             namelist="&case name='t' /",
             resolved_namelist="&case name='t' /",
         )
+        file.attrs.update(attributes)
         geometry = file.create_group("geometry")
         geometry.attrs.update(toe=5.0, x_min=0.0, x_max=20.0, cell_size=0.5, point_spacing=0.25)
         for order, case in enumerate(cases, start=1):
@@ -53,11 +55,21 @@ def _write_case(group, case, order):
         order=order,
         is_homogeneous=int(case["label"] == "deterministic"),
         planned=case.get("planned", len(values)),
+        **case.get("more", {}),
     )
     group["id"], group["status"] = ids, np.where(failed, 2, 0).astype(np.int32)
+    own = case.get("columns", {})
     for name in FLOAT_COLUMNS:
+        if name == "log_weight" and name not in own:
+            continue  # as files of earlier versions
         column = (
-            values * RUNOUTS_FACTOR.get(name, 0.0) if name in RUNOUTS else np.full(len(values), 0.5)
+            own[name]
+            if name in own
+            else (
+                values * RUNOUTS_FACTOR.get(name, 0.0)
+                if name in RUNOUTS
+                else np.full(len(values), 0.5)
+            )
         )
         group[name] = np.where(failed & (name != "failure_x"), np.nan, column)
         group[name].attrs["units"] = "m"

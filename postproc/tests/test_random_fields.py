@@ -211,6 +211,16 @@ def test_noise_is_that_of_philox_written_out():
     assert numbers.min() > 0.0 and numbers.max() < 1.0
 
 
+def test_twins_on_coarser_cells_are_not_rebuilt(tmp_path):
+    """Their points are not those on record."""
+    group = {"name": "phi", "property": "friction_angle", "mean": 35.0, "scale_x": 0.4,
+             "scale_y": 0.4}  # fmt: skip
+    write_run(tmp_path, [group], [lattice_points(3, 2)], members=1, covs=(0.1, 0.2))
+    with h5py.File(tmp_path / "ensemble.h5", "r+") as file:
+        file["cases/snx_cov0.20"].attrs["role"] = "control"
+    assert [case.label for case in read_random_fields(tmp_path).cases] == ["snx_cov0.10"]
+
+
 def test_antithetic_pairs_cancel():
     first, second, third = (normal("antithetic", 7, 1, i, 50, 4) for i in (1, 2, 3))
     assert (first + second == 0.0).all()

@@ -10,11 +10,12 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from scipy import stats
 from synthetic import RUNOUTS_FACTOR, sample, write_ensemble
 
 from sgimp_post.cli import main
-from sgimp_post.ensemble import Geometry
-from sgimp_post.figures import configuration_figure
+from sgimp_post.ensemble import Geometry, read_ensemble
+from sgimp_post.figures import configuration_figure, weighted_figure
 from sgimp_post.snapshots import Snapshot, State, read_snapshot
 
 HOMOGENEOUS = {"label": "deterministic", "values": sample(1, 8, 5.6, 0.05)}
@@ -342,3 +343,151 @@ def test_field_columns_have_their_unit(tmp_path, capsys):
                 case["field_mean"].attrs["units"] = unit
         html, _ = report(directory, capsys)
         assert shown in html
+
+
+def damping_study():
+    """Two dampings with a homogeneous case each, two functions, two coefficients of variation; the
+    twin of one case."""
+    cases = []
+    for damping, mean in (("0.4", 5.6), ("0.7", 5.0)):
+        varied, noise = f"damping={damping}", f"deterministic_damping{damping}"
+        more = {"role": "homogeneous", "varied": varied}
+        cases.append({"label": noise, "values": sample(1, 8, mean, 0.05), "more": more})
+        more = {"role": "study", "varied": varied, "noise_case": noise}
+        for acf, cov in (("snx", 0.05), ("snx", 0.1), ("sqx", 0.05)):
+            label = f"{acf}_cov{cov:.2f}_damping{damping}"
+            values = mean + 2.0 * cov * sample(3, 50, 0.0, 1.0) + (acf == "sqx") * 0.01
+            case = {"label": label, "acf": acf, "cov": cov, "values": values, "more": more}
+            cases.append({**case, "columns": {"seconds": np.full(50, 4.0)}})
+    twin = {"role": "control", "control_of": cases[1]["label"]}
+    values = np.concatenate(
+        [cases[1]["values"] + sample(5, 50, 0.0, 0.02), sample(6, 100, 5.6, 0.1)]
+    )
+    columns = {"seconds": np.full(150, 0.4)}
+    return [*cases, {"label": "twin", "values": values, "more": twin, "columns": columns}]
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_study_of_another_key_gives_a_sound_page(tmp_path, capsys):
+    write_ensemble(tmp_path, damping_study())
+    html, _ = report(tmp_path, capsys)
+    assert_page_is_sound(html, tmp_path / "report")
+    assert "deterministic_damping0.7" in html and "Against the coefficient" not in html
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_each_case_stands_against_its_own_noise_floor(tmp_path, capsys):
+    cases = damping_study()
+    write_ensemble(tmp_path, cases)
+    _, numbers = report(tmp_path, capsys)
+    assert list(numbers["floors"]) == ["deterministic_damping0.4", "deterministic_damping0.7"]
+    assert len(numbers["cases"]) == 6
+    noise, case = cases[4]["values"], cases[5]["values"]
+    assert numbers["cases"][3]["label"] == cases[5]["label"]
+    for name, factor in RUNOUTS_FACTOR.items():
+        got = numbers["cases"][3]["against_floor"][name]
+        share = 1.0 - np.var(noise, ddof=1) / np.var(case, ddof=1)
+        assert got["soil_share"]["value"] == pytest.approx(share, rel=1e-9)
+        assert got["soil_share"]["low"] < share < got["soil_share"]["high"]
+        shift = factor * (case.mean() - noise.mean())
+        assert got["shift"]["mean"] == pytest.approx(shift, rel=1e-9)
+        assert got["exceedance"]["share"]["value"] == np.mean(case > noise.mean())
+        assert got["above_nominal"] == np.mean(case > noise[0])
+    with open(tmp_path / "report" / "noise_floor.csv", newline="", encoding="utf-8") as file:
+        rows = {(row["case"], row["runout"]): row for row in csv.DictReader(file)}
+    got = numbers["cases"][3]["against_floor"]["runout_max"]
+    row = rows[cases[5]["label"], "runout_max"]
+    assert float(row["noise_sd"]) == pytest.approx(np.std(noise, ddof=1))
+    assert float(row["exceedance_share_low"]) == got["exceedance"]["share"]["low"]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_pairs_differ_in_one_thing(tmp_path, capsys):
+    write_ensemble(tmp_path, damping_study())
+    html, numbers = report(tmp_path, capsys)
+    found = {}
+    for pair in numbers["pairs"]:
+        found.setdefault(pair["by"], []).append(pair)
+    assert {by: len(rows) for by, rows in found.items()} == {"acf": 2, "cov": 2, "damping": 3}
+    assert all(pair["mean"] == pytest.approx(0.6) for pair in found["damping"])
+    assert all(pair["mean"] == pytest.approx(-0.01) for pair in found["acf"])
+    for rows in found.values():  # Holm among the rows of one kind alone
+        assert min(row["p_adjusted"] for row in rows) == pytest.approx(
+            min(1.0, len(rows) * min(row["p_value"] for row in rows))
+        )
+    assert "By damping" in html
+    with open(tmp_path / "report" / "pairs.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["mean"]) for row in rows] == [pair["mean"] for pair in numbers["pairs"]]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_rows_of_pairs_are_limited_in_the_page_only(tmp_path, capsys):
+    cases = [
+        {**base(10), "label": f"base_h{k}", "more": {"varied": f"cell_size={k}"}} for k in range(12)
+    ]
+    write_ensemble(tmp_path, cases)
+    html, numbers = report(tmp_path, capsys)
+    assert len(numbers["pairs"]) == 66 and "The 45 of the smallest p of 66" in html
+    assert len(re.findall(r"base_h\d+ − base_h\d+", html)) == 45
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_twin_is_a_control_and_no_case_of_the_study(tmp_path, capsys):
+    cases = damping_study()
+    write_ensemble(tmp_path, cases)
+    html, numbers = report(tmp_path, capsys)
+    (entry,) = numbers["controls"]
+    assert (entry["case"], entry["twin"]) == (cases[1]["label"], "twin")
+    assert entry["cost_ratio"] == pytest.approx(10.0)
+    assert {row["quantity"] for row in entry["rows"]} == {"mean", "sd", "exceedance"}
+    y, twins = cases[1]["values"], cases[-1]["values"]
+    slope = np.cov(y, twins[:50])[0, 1] / np.var(twins[:50], ddof=1)
+    row = entry["rows"][0]
+    assert row["value"] == pytest.approx(y.mean() + slope * (twins.mean() - twins[:50].mean()))
+    assert row["gain"] == pytest.approx(row["variance_ratio"] * 50 / (50 + 150 / 10.0))
+    assert "Fewer runs for the same answer" in html and ">twin<" in html
+    write_ensemble(tmp_path / "mirrored", cases, sampling="antithetic")
+    _, numbers = report(tmp_path / "mirrored", capsys)
+    assert numbers["controls"] == []
+
+
+def weighted_case():
+    """Members drawn three standard deviations out."""
+    xi = sample(7, 1000, 3.0, 1.0)
+    return base(0) | {"values": 5.6 + 0.1 * xi, "columns": {"log_weight": 4.5 - 3.0 * xi}}
+
+
+@pytest.mark.filterwarnings("error")
+def test_members_of_importance_sampling_are_never_shown_as_plain_ones(tmp_path, capsys):
+    write_ensemble(tmp_path, [HOMOGENEOUS, weighted_case()], sampling="importance")
+    html, numbers = report(tmp_path, capsys)
+    assert_page_is_sound(html, tmp_path / "report")
+    assert "Plain means, spreads, histograms" in html and "Distribution, convergence" not in html
+    assert "Exceedance probability from weighted members" in html
+    (case,), (weighted,) = numbers["cases"], numbers["importance"]
+    assert case["runouts"]["runout_max"]["n"] == 0 and case["fits"][0]["note"]
+    assert weighted["mean"]["value"] is None
+    exact = {row["threshold"]: stats.norm.sf((row["threshold"] - 5.6) / 0.1)
+             for row in weighted["rows"]}  # fmt: skip
+    assert len(exact) >= 4 and min(exact.values()) < 1e-4
+    for row in weighted["rows"]:
+        assert row["value"] == pytest.approx(exact[row["threshold"]], rel=0.5)
+
+
+def test_the_curve_of_weighted_members_is_the_exact_one(tmp_path):
+    """Within 40 %, where three standard errors of ten effective members would be 95 %."""
+    ensemble = read_ensemble(write_ensemble(tmp_path, [weighted_case()], sampling="importance"))
+    figure = weighted_figure(ensemble.cases, "runout_max", {"mean": np.nan, "sd": np.nan})
+    x, p = figure.axes[0].lines[0].get_data()
+    assert len(x) > 100 and p[-1] < 1e-5
+    assert p == pytest.approx(stats.norm.sf((x - 5.6) / 0.1), rel=0.4)
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_case_that_its_stop_rule_ended_is_told(tmp_path, capsys):
+    case = base(30, more={"stop_rule_met": 1}, planned=20)
+    write_ensemble(tmp_path, [HOMOGENEOUS, case])
+    html, numbers = report(tmp_path, capsys)
+    assert "The stop rule ended base" in html
+    assert numbers["cases"][0]["runouts"]["runout_max"]["n"] == 20
