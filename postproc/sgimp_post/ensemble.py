@@ -104,6 +104,8 @@ class Case:
     control_of: str
     #: Keys of the study beyond acf and cov, with their values as text.
     varied: dict
+    #: Its fields are those that /random_fields describes.
+    has_recorded_fields: bool
     planned: int
     #: The case was ended by its stop rule, `planned` members from the first on.
     stop_rule_met: bool
@@ -279,6 +281,7 @@ def _read_case(path: Path, label: str, group: h5py.Group, geometry: Geometry) ->
         noise_case=str(attributes.get("noise_case", "")),
         control_of=str(attributes.get("control_of", "")),
         varied=_varied(str(attributes.get("varied", ""))),
+        has_recorded_fields=bool(attributes.get("has_recorded_fields", 1)),
         planned=int(attributes.get("planned", count)),
         stop_rule_met=bool(attributes.get("stop_rule_met", 0)),
         order=int(attributes.get("order", 0)),

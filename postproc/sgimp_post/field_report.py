@@ -46,6 +46,15 @@ def run(options) -> int:
 
 def write_audit(fields, options) -> int:
     """audit.json, audit.csv and the figures; prints the table and the verdict."""
+    if fields.tilt:
+        raise PostError(
+            "members of importance sampling are drawn from shifted fields and weighted: there is no"
+            " law that they should follow (--csv, --h5 and --against rebuild them)"
+        )
+    left_out = [case.label for case in fields.study_cases if not case.has_recorded_fields]
+    if left_out:
+        total = len(fields.study_cases)
+        print(f"left out, as the record is of other fields: {len(left_out)} of {total} study cases")
     numbers = audit(fields, options.members or MEMBERS)
     directory = Path(options.out) if options.out else fields.directory / "fields"
     checks = [{**asdict(check), "inside": check.inside} for check in numbers["checks"]]
@@ -69,8 +78,9 @@ def write_audit(fields, options) -> int:
 
 def _table(numbers):
     """Lines for the terminal: one a case and field."""
+    width = max(18, *(len(entry["case"]) for entry in numbers["fields"]))
     yield (
-        f"{'case':<18} {'field':<18} {'N':>5} {'mean':>11} {'target':>11} {'sd':>10} {'target':>10}"
+        f"{'case':<{width}} {'field':<18} {'N':>5} {'mean':>11} {'target':>11} {'sd':>10} {'target':>10}"
         f" {'clipped':>9} {'inside':>9}  method"
     )
     checks = {}
@@ -86,7 +96,7 @@ def _table(numbers):
             method += f", jitter {max(entry['jitter']):.0e}"
         inside = f"{sum(c.inside for c in mine)}/{len(mine)}"
         yield (
-            f"{entry['case']:<18} {entry['field']:<18} {entry['members']:>5} {mean.value:>11.5g}"
+            f"{entry['case']:<{width}} {entry['field']:<18} {entry['members']:>5} {mean.value:>11.5g}"
             f" {mean.expected:>11.5g} {sd.value:>10.4g} {sd.expected:>10.4g}"
             f" {entry['clipped']:>9.2e} {inside:>9}  {method}"
         )

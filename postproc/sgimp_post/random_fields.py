@@ -154,6 +154,8 @@ class RandomFields:
     seed: int
     plan: str
     realizations: int
+    #: Shift of the mean of the first Gaussian field in its standard deviations (importance sampling).
+    tilt: float
     #: Of the solver, in which the program keeps the properties.
     precision: str
     #: Correlation matrix of the fields, in the order of the groups.
@@ -169,6 +171,11 @@ class RandomFields:
 
     @property
     def cases(self) -> list:
+        """The study cases whose fields are those of the record."""
+        return [case for case in self.study_cases if case.has_recorded_fields]
+
+    @property
+    def study_cases(self) -> list:
         return [case for case in self.ensemble.cases if case.role == "study"]
 
     @property
@@ -220,11 +227,22 @@ class RandomFields:
 
     def gaussian(self, case, ids) -> dict:
         """Standard Gaussian fields {name: [N, n]} before they know any data."""
-        return {
+        fields = {
             spec.name: self.sampler(spec, case).sample(self.noise(spec, case, ids))
             for spec in self.specs
             if not spec.file
         }
+        if self.tilt:
+            fields[self.specs[0].name] += self.tilt * self._direction(self.specs[0], case)
+        return fields
+
+    def _direction(self, spec, case):
+        """C a/sqrt(a^T C a) with a = 1/n at each of the n points [n]: how the field goes when its
+        mean goes by one standard deviation."""
+        x, y = spec.points.x, spec.points.y
+        correlation = spec.correlation(spec.acf_of(case))
+        rows = [correlation.at(x - x[i], y - y[i]).mean() for i in range(len(x))]
+        return np.array(rows) / np.sqrt(np.mean(rows))
 
     def conditioned(self, case, ids, fields=None) -> dict:
         """The same with the data taken in; the very same where there is none."""
@@ -368,6 +386,7 @@ def read_random_fields(directory: Path) -> RandomFields | None:
         int(ensemble.attributes.get("seed", monte_carlo.get("seed", 0))),
         plan,
         int(monte_carlo.get("realizations", 0)),
+        float(monte_carlo.get("tilt", 0.0)) if plan == "importance" else 0.0,
         str(solver.get("precision", "double")).lower(),
         _cross_correlation(specs, [keys for name, keys in groups if name == "cross_correlation"]),
     )

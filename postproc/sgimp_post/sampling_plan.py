@@ -12,7 +12,8 @@ DATA_STREAM = 3
 #: Streams of the second field on: this number plus its index.
 LATER_FIELDS = 100
 _LOW_32_BITS = 2**32 - 1
-PLANS = ("random", "antithetic", "latin_hypercube")
+#: Members of importance sampling have the noise of random ones, and their first field is shifted.
+PLANS = ("random", "antithetic", "latin_hypercube", "importance")
 
 
 def field_stream(index: int) -> int:
@@ -84,7 +85,7 @@ def _mixed(value, key):
 
 def normal(plan: str, seed: int, stream: int, realization: int, count: int, realizations: int):
     """Standard normal numbers [count] of one member under a sampling plan."""
-    if plan == "random":
+    if plan in ("random", "importance"):
         return ndtri(uniform(seed, stream, realization, count))
     if plan == "antithetic":
         odd = realization - (realization + 1) % 2

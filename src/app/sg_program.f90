@@ -160,6 +160,8 @@ contains
           g%y_max = grid%y_max
           g%cell_size = grid%cell_size
           g%profile_x = scene%profile_x
+          g%has_recorded_fields = ground%source == model%grounds(1)%source .and. &
+            .not. allocated(ground%restrictions)
         end associate
       end associate
     end do

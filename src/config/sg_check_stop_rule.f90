@@ -24,9 +24,9 @@ contains
           'hypercube, which is stratified over all realizations, in the middle (allowed: '// &
           'stop_rule = ''count'', or another sampling)')
       else if (given%sampling == 'importance') then
-        call desk%fault(GROUP, 1, 'stop_rule', quoted(given%stop_rule)//' looks at members that '// &
-          'all count the same, not at weighted ones (allowed: stop_rule = ''count'', or another '// &
-          'sampling)')
+        call desk%fault(GROUP, 1, 'stop_rule', quoted(given%stop_rule)//' looks at members '// &
+          'that all count the same, not at weighted ones (allowed: stop_rule = ''count'', or '// &
+          'another sampling)')
       else if (given%sampling == 'antithetic') then
         call check_even(desk, 'stop_minimum', given%stop_minimum)
         call check_even(desk, 'stop_batch', given%stop_batch)

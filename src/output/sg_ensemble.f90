@@ -26,6 +26,8 @@ module sg_ensemble
     real(wp) :: cell_size = 0.0_wp
     !> Cell centres of the columns of the profile; `outcome%height` has the same size.
     real(wp), allocatable :: profile_x(:)
+    !> The random fields at its points are those that the file describes.
+    logical :: has_recorded_fields = .true.
   end type case_geometry_t
 
   !> The members of one study case that are there, at the position of their id.
@@ -218,6 +220,8 @@ contains
     call file%set(group, 'noise_case', results%noise_case)
     call file%set(group, 'control_of', results%control_of)
     call write_geometry(file, group, results%geometry)
+    call file%set(group, 'has_recorded_fields', merge(1_i4, 0_i4, &
+      results%geometry%has_recorded_fields))
     call file%set(group, 'acf', results%acf)
     call file%set(group, 'cov', results%cov)
     call file%set(group, 'mean', results%mean)
