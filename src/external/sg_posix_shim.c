@@ -194,7 +194,9 @@ int sg_make_directory(const char *path)
     if (!last && *mark != '/')
       continue;
     *mark = '\0';
-    if (mkdir(copy, 0777) != 0 && !(stat(copy, &status) == 0 && S_ISDIR(status.st_mode)))
+    if (mkdir(copy, 0777) == 0)
+      (void)sync_parent(copy);  /* where that is not allowed, it is left to the system */
+    else if (!(stat(copy, &status) == 0 && S_ISDIR(status.st_mode)))
       result = -errno;
     if (last)
       break;
