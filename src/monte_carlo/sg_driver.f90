@@ -54,7 +54,7 @@ module sg_driver
     real(wp) :: point_spacing = 0.0_wp
     !> Throw away what the directory holds of earlier runs.
     logical :: overwrite = .false.
-    !> Wall clock limit of the whole run in s, counted from the start of the program; 0 = none.
+    !> Wall clock limit in s, counted from the call of `run_ensemble`; 0 = none.
     real(wp) :: walltime = 0.0_wp
     !> `compare_configs` of sg_resolved; without it any difference of the texts counts.
     procedure(compare_interface), pointer, nopass :: compare => null()
@@ -330,8 +330,17 @@ contains
     director%record%ended = utc_time()
     director%record%state = 'complete'
     if (exit_code == EXIT_STOPPED_EARLY) director%record%state = 'stopped'
-    call director%write_results(error)
-    if (allocated(director%error)) error = director%error
+    if (allocated(director%error)) then
+      ! ensemble.h5 stays as it is: what could not be kept is not told.
+      error = director%error
+    else
+      call director%write_results(error)
+    end if
+    if (allocated(error)) then
+      exit_code = error%code
+      director%record%state = 'stopped'
+      director%stop_reason = error%message
+    end if
     call tell_cases(director)
     call tell_end(director, done, failed, exit_code)
     ! The request to stop is met: the same command goes on.
@@ -348,7 +357,11 @@ contains
     text = to_text(done)//' of '//to_text(director%plan%total())//' members done, '// &
            to_text(failed)//' failed, '//text_of_duration(wall_seconds() - director%start)
     select case (exit_code)
-    case (EXIT_STOPPED_EARLY)
+    case (EXIT_OK)
+      call director%progress%say('complete: '//text)
+    case (EXIT_TOO_MANY_FAILED)
+      call director%progress%say('complete, but more members failed than allowed: '//text)
+    case default
       call director%progress%say('stopped by '//director%stop_reason//': '//text// &
         '; the same command goes on')
       do i = 1, size(director%results)
@@ -357,10 +370,6 @@ contains
           call director%progress%say('not run of '//r%label//': '//id_list(.not. r%present))
         end associate
       end do
-    case (EXIT_TOO_MANY_FAILED)
-      call director%progress%say('complete, but more members failed than allowed: '//text)
-    case default
-      call director%progress%say('complete: '//text)
     end select
     call director%progress%tell('end', '"state":'//json_text(director%record%state)//',"done":'// &
       to_text(done)//',"failed":'//to_text(failed)//',"exit_code":'//to_text(exit_code))
