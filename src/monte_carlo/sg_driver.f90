@@ -260,7 +260,7 @@ contains
       if (damage(i)%is_tail) then
         call director%progress%say('the end of the journal was cut off: '// &
           to_text(damage(i)%length)//' bytes removed')
-      else if (is_missing(director, damage(i))) then
+      else if (done < director%plan%total() .and. is_missing(director, damage(i))) then
         call director%progress%say('a damaged record of the journal is left out: '// &
           damaged_name(director, damage(i))//', which is computed again')
       end if
