@@ -161,10 +161,10 @@ def ranks_of(process):
     found = []
     for path in pathlib.Path("/proc").glob("[0-9]*/stat"):
         try:
-            parent = path.read_text().rpartition(")")[2].split()[1]
+            name, _, rest = path.read_text().rpartition(")")
         except OSError:  # ended meanwhile
             continue
-        if int(parent) == process.pid:
+        if int(rest.split()[1]) == process.pid and name.endswith("(sgimp"):
             found.append(int(path.parent.name))
     return found
 

@@ -63,8 +63,11 @@ def main():
     for attempt in range(4 * KILLS):
         kind = min(counts, key=counts.get)
         directory = program.root / f"killed_{number}"
-        process = program.start(directory.name, RANKS[attempt % len(RANKS)])
-        time.sleep(chance.uniform(0.1, 1.2))
+        number_of_ranks = RANKS[attempt % len(RANKS)]
+        process = program.start(directory.name, number_of_ranks)
+        # Open MPI hangs when a rank is killed before the last one was started.
+        wait_until(lambda one=process, n=number_of_ranks: len(ranks_of(one)) == n or one.poll() is not None, "ranks")
+        time.sleep(chance.uniform(0.0, 1.0))
         ranks, struck = strike(process, kind, chance)
         text, _ = process.communicate(timeout=60)
         wait_until(lambda those=ranks: not any(map(alive, those)), "ranks to end")
