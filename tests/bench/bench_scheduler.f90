@@ -14,7 +14,7 @@ program bench_scheduler
   use sg_posix, only: remove_file
   use sg_scheduler, only: run_members
   use sg_timer, only: wall_seconds
-  use sleeping_members, only: counting_director_t, make_row, PROFILE_COLUMNS, &
+  use sleeping_members, only: counting_director_t, make_record, make_row, PROFILE_COLUMNS, &
     sleeping_model_t
   implicit none
 
@@ -157,21 +157,6 @@ contains
     print '(a, i0, a, f8.3, a)', ENSEMBLE_NAME//' of ', CASES*MEMBERS_PER_CASE, ' members: ', &
       seconds, ' s'
   end subroutine time_ensemble
-
-  subroutine make_record(record)
-    type(run_record_t), intent(out) :: record
-    integer :: i
-
-    record%case_text = '&case /'
-    record%resolved = '&case /'
-    record%host = ''
-    record%started = ''
-    record%ended = ''
-    record%state = 'bench'
-    record%config_hash = ''
-    record%field_method = ''
-    record%profile_x = [(0.125_wp*i, i=1, PROFILE_COLUMNS)]
-  end subroutine make_record
 
   !> What rank 0 does for one row that waits, but for keeping it: look, receive, unpack, and a new
   !> task.

@@ -1,6 +1,7 @@
 !> Members that sleep for a known time, and a director that only counts them: for measurements of
 !> the scheduler.
 module sleeping_members
+  use sg_ensemble, only: run_record_t
   use sg_errors, only: error_t
   use sg_journal, only: journal_t
   use sg_kinds, only: i8, wp
@@ -13,7 +14,7 @@ module sleeping_members
   implicit none
   private
 
-  public :: counting_director_t, make_row, PROFILE_COLUMNS, sleeping_model_t
+  public :: counting_director_t, make_record, make_row, PROFILE_COLUMNS, sleeping_model_t
 
   !> Columns of the paper's profile.
   integer, parameter :: PROFILE_COLUMNS = 160
@@ -81,6 +82,24 @@ contains
     outcome%values = 0.0_wp
     outcome%height = 0.0
   end subroutine make_row
+
+  !> What ensemble.h5 says of such a run: the least that it wants to be said.
+  subroutine make_record(record)
+    type(run_record_t), intent(out) :: record
+    integer :: i
+
+    record%case_text = '&case /'
+    record%resolved = '&case /'
+    record%host = ''
+    record%started = ''
+    record%ended = ''
+    record%state = 'bench'
+    record%config_hash = ''
+    record%field_method = ''
+    record%sampling = ''
+    allocate (record%fields(0))
+    record%profile_x = [(0.125_wp*i, i=1, PROFILE_COLUMNS)]
+  end subroutine make_record
 
   !> From now on rows go into a new journal in the present directory.
   subroutine keep_journal(this, error)
