@@ -330,12 +330,7 @@ contains
     director%record%ended = utc_time()
     director%record%state = 'complete'
     if (exit_code == EXIT_STOPPED_EARLY) director%record%state = 'stopped'
-    if (allocated(director%error)) then
-      ! ensemble.h5 stays as it is: what could not be kept is not told.
-      error = director%error
-    else
-      call director%write_results(error)
-    end if
+    call director%write_results(error)
     if (allocated(error)) then
       exit_code = error%code
       director%record%state = 'stopped'

@@ -4,6 +4,7 @@ import argparse
 import os
 import pathlib
 import shutil
+import signal
 import struct
 import subprocess
 import tempfile
@@ -58,7 +59,7 @@ class Program:
     def run(self, directory, ranks, *options, expect=0, **how):
         """Runs it to its end and returns what it printed; `how` is that of `start`."""
         process = self.start(directory, ranks, *options, **how)
-        text, _ = process.communicate(timeout=250)
+        text = await_end(process)
         check(process.returncode == expect, f"{directory}: exit code {process.returncode}, not {expect}:\n{text}")
         return text
 
@@ -167,6 +168,16 @@ def ranks_of(process):
         if int(rest.split()[1]) == process.pid and name.endswith("(sgimp"):
             found.append(int(path.parent.name))
     return found
+
+
+def await_end(process, limit=250):
+    """What a run prints until it ends; one that goes on for longer than `limit` seconds is a failure, and killed."""
+    try:
+        return process.communicate(timeout=limit)[0]
+    except subprocess.TimeoutExpired:
+        for victim in [*ranks_of(process), process.pid]:
+            os.kill(victim, signal.SIGKILL)
+        raise SystemExit(f"FAILED: still at work after {limit} s: {' '.join(process.args)}") from None
 
 
 def wait_until(condition, what, limit=60):

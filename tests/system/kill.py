@@ -8,7 +8,7 @@ import random
 import signal
 import time
 
-from common import Journal, Program, arguments, check, check_equal, ids, ranks_of, state, tried, wait_until
+from common import Journal, Program, arguments, await_end, check, check_equal, ids, ranks_of, state, tried, wait_until
 
 KILLS = 20
 RANKS = (2, 3, 1, 5)
@@ -69,7 +69,7 @@ def main():
         wait_until(lambda one=process, n=number_of_ranks: len(ranks_of(one)) == n or one.poll() is not None, "ranks")
         time.sleep(chance.uniform(0.0, 1.0))
         ranks, struck = strike(process, kind, chance)
-        text, _ = process.communicate(timeout=60)
+        text = await_end(process, 60)
         wait_until(lambda those=ranks: not any(map(alive, those)), "ranks to end")
         # Killed in its last moment, a run may have been complete.
         hit = process.returncode != 0

@@ -9,7 +9,7 @@ import os
 import signal
 import time
 
-from common import Journal, Program, arguments, check, check_equal, ids, ranks_of, state, tried, wait_until
+from common import Journal, Program, arguments, await_end, check, check_equal, ids, ranks_of, state, tried, wait_until
 
 given = arguments()
 program = Program(given)
@@ -26,7 +26,7 @@ def stopped(name, act, ranks=2, codes=(3,)):
     wait_until(lambda: len(Journal(directory / "journal.bin").records) > 20, "members")
     asked = time.monotonic()
     act(directory, process)
-    text, _ = process.communicate(timeout=60)
+    text = await_end(process, 60)
     check(process.returncode in codes, f"{name}: exit code {process.returncode}\n{text}")
     check(time.monotonic() - asked < 10, f"{name}: slow end")
     check("not run of" in (directory / "run.log").read_text(), f"{name}: ids not named\n{text}")

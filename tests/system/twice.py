@@ -1,6 +1,6 @@
 """A second run in a directory where one is at work refuses, also with --overwrite, and the first is not disturbed."""
 
-from common import Journal, Program, arguments, check, check_equal, tried, wait_until
+from common import Journal, Program, arguments, await_end, check, check_equal, tried, wait_until
 
 given = arguments()
 program = Program(given)
@@ -13,7 +13,7 @@ for options, ranks in (((), 2), (("--overwrite",), 0)):
     text = program.run("shared", ranks, *options, expect=2)
     check(f"another run is at work in {directory}" in text, f"not said:\n{text}")
 check(first.poll() is None, "the first run was over before the others began")
-text, _ = first.communicate(timeout=250)
+text = await_end(first)
 check(first.returncode == 0, f"the first run was disturbed: exit code {first.returncode}\n{text}")
 check(len((directory / "run.log").read_text().split("members of 3 cases")) == 2, "others have written into run.log")
 check_equal(program.root / "alone", directory, "two runs")
