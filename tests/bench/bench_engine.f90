@@ -83,7 +83,7 @@ contains
     real(wp) :: parts(5)
 
     parts = [wall, director%keeping, director%syncing, director%writing, 0.0_wp]
-    ! The loop of rank 0, its own rows, and, with more ranks, pack, send, receive, unpack and a task.
+    ! Its own loop and rows and, with more ranks, pack, send, receive, unpack and the next task.
     parts(5) = wall - sum(parts(2:4))
     parts = 1.0e6_wp*parts/members
     print '(a)', '| ranks | members | wall | messages | journal | sync | ensemble.h5 |'

@@ -21,7 +21,7 @@
 #include <unistd.h>
 
 /* The function of the C library behind the one of this name here. */
-#define NEXT(type, name) ((type)dlsym(RTLD_NEXT, name))
+#define NEXT(name) dlsym(RTLD_NEXT, name)
 
 static long long written, syncs;
 
@@ -36,7 +36,8 @@ static int is_faulty(int descriptor)
 {
   char link[64], path[PATH_MAX];
   struct stat status;
-  if (getenv("SGIMP_FAULT_PATH") == NULL || fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode))
+  if (getenv("SGIMP_FAULT_PATH") == NULL || fstat(descriptor, &status) != 0
+      || !S_ISREG(status.st_mode))
     return 0;
   snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
   ssize_t length = readlink(link, path, sizeof path - 1);
@@ -65,30 +66,32 @@ static ssize_t room_for(int descriptor, size_t length)
 
 ssize_t write(int descriptor, const void *bytes, size_t length)
 {
+  ssize_t (*next)(int, const void *, size_t) = NEXT("write");
   ssize_t room = room_for(descriptor, length);
-  return room < 0 ? -1 : NEXT(ssize_t (*)(int, const void *, size_t), "write")(descriptor, bytes, (size_t)room);
+  return room < 0 ? -1 : next(descriptor, bytes, (size_t)room);
 }
 
 ssize_t pwrite(int descriptor, const void *bytes, size_t length, off_t offset)
 {
+  ssize_t (*next)(int, const void *, size_t, off_t) = NEXT("pwrite");
   ssize_t room = room_for(descriptor, length);
-  return room < 0 ? -1
-    : NEXT(ssize_t (*)(int, const void *, size_t, off_t), "pwrite")(descriptor, bytes, (size_t)room, offset);
+  return room < 0 ? -1 : next(descriptor, bytes, (size_t)room, offset);
 }
 
 ssize_t pwrite64(int descriptor, const void *bytes, size_t length, off64_t offset)
 {
+  ssize_t (*next)(int, const void *, size_t, off64_t) = NEXT("pwrite64");
   ssize_t room = room_for(descriptor, length);
-  return room < 0 ? -1
-    : NEXT(ssize_t (*)(int, const void *, size_t, off64_t), "pwrite64")(descriptor, bytes, (size_t)room, offset);
+  return room < 0 ? -1 : next(descriptor, bytes, (size_t)room, offset);
 }
 
 /* A short write of the first part is allowed. */
 ssize_t writev(int descriptor, const struct iovec *parts, int count)
 {
+  ssize_t (*next)(int, const struct iovec *, int) = NEXT("writev");
   if (count > 0 && is_faulty(descriptor))
     return write(descriptor, parts[0].iov_base, parts[0].iov_len);
-  return NEXT(ssize_t (*)(int, const struct iovec *, int), "writev")(descriptor, parts, count);
+  return next(descriptor, parts, count);
 }
 
 /* A file that grows needs room as well. */
@@ -102,28 +105,31 @@ static int may_grow(int descriptor, long long length)
 
 int ftruncate(int descriptor, off_t length)
 {
+  int (*next)(int, off_t) = NEXT("ftruncate");
   if (may_grow(descriptor, length))
-    return NEXT(int (*)(int, off_t), "ftruncate")(descriptor, length);
+    return next(descriptor, length);
   errno = ENOSPC;
   return -1;
 }
 
 int ftruncate64(int descriptor, off64_t length)
 {
+  int (*next)(int, off64_t) = NEXT("ftruncate64");
   if (may_grow(descriptor, length))
-    return NEXT(int (*)(int, off64_t), "ftruncate64")(descriptor, length);
+    return next(descriptor, length);
   errno = ENOSPC;
   return -1;
 }
 
 int fsync(int descriptor)
 {
+  int (*next)(int) = NEXT("fsync");
   const char *first = getenv("SGIMP_FAULT_SYNC");
   if (first != NULL && is_faulty(descriptor) && ++syncs >= atoll(first)) {
     errno = EIO;
     return -1;
   }
-  return NEXT(int (*)(int), "fsync")(descriptor);
+  return next(descriptor);
 }
 
 static int may_open(const char *path, int flags)
@@ -135,16 +141,19 @@ static int may_open(const char *path, int flags)
 }
 
 /* The mode is there only with flags that make files, but reading it does no harm here. */
-#define MODE_OF(flags) va_list rest; va_start(rest, flags); mode_t mode = va_arg(rest, mode_t); va_end(rest)
+#define MODE_OF(flags) \
+  va_list rest; va_start(rest, flags); mode_t mode = va_arg(rest, mode_t); va_end(rest)
 
 int open(const char *path, int flags, ...)
 {
+  int (*next)(const char *, int, ...) = NEXT("open");
   MODE_OF(flags);
-  return may_open(path, flags) ? NEXT(int (*)(const char *, int, ...), "open")(path, flags, mode) : -1;
+  return may_open(path, flags) ? next(path, flags, mode) : -1;
 }
 
 int open64(const char *path, int flags, ...)
 {
+  int (*next)(const char *, int, ...) = NEXT("open64");
   MODE_OF(flags);
-  return may_open(path, flags) ? NEXT(int (*)(const char *, int, ...), "open64")(path, flags, mode) : -1;
+  return may_open(path, flags) ? next(path, flags, mode) : -1;
 }
