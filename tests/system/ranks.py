@@ -2,7 +2,9 @@
 
 from common import Program, arguments, check, check_equal, state
 
-program = Program(arguments())
+given = arguments()
+program = Program(given)
+given.case = program.changed_case("realizations=160", "realizations=80")
 for ranks in (0, 1, 2, 3, 5):
     program.run(f"on_{ranks}", ranks)
     check(state(program.root / f"on_{ranks}") == "complete", "not complete")
