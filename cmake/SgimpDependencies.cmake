@@ -19,8 +19,8 @@ if(NOT TARGET BLAS::BLAS OR NOT TARGET LAPACK::LAPACK)
   sgimp_missing("BLAS and LAPACK" "libopenblas-dev" "openblas")
 endif()
 
-find_package(HDF5 QUIET COMPONENTS Fortran)
-if(NOT TARGET hdf5::hdf5_fortran)
+find_package(HDF5 QUIET COMPONENTS C Fortran)
+if(NOT TARGET hdf5::hdf5 OR NOT TARGET hdf5::hdf5_fortran)
   sgimp_missing("HDF5 with its Fortran interface" "libhdf5-dev" "hdf5+fortran")
 endif()
 

@@ -80,8 +80,8 @@ def _table(numbers):
     """Lines for the terminal: one a case and field."""
     width = max(18, *(len(entry["case"]) for entry in numbers["fields"]))
     yield (
-        f"{'case':<{width}} {'field':<18} {'N':>5} {'mean':>11} {'target':>11} {'sd':>10} {'target':>10}"
-        f" {'clipped':>9} {'inside':>9}  method"
+        f"{'case':<{width}} {'field':<18} {'N':>5} {'mean':>11} {'target':>11} {'sd':>10}"
+        f" {'target':>10} {'clipped':>9} {'inside':>9}  method"
     )
     checks = {}
     for check in numbers["checks"]:
@@ -96,8 +96,8 @@ def _table(numbers):
             method += f", jitter {max(entry['jitter']):.0e}"
         inside = f"{sum(c.inside for c in mine)}/{len(mine)}"
         yield (
-            f"{entry['case']:<{width}} {entry['field']:<18} {entry['members']:>5} {mean.value:>11.5g}"
-            f" {mean.expected:>11.5g} {sd.value:>10.4g} {sd.expected:>10.4g}"
+            f"{entry['case']:<{width}} {entry['field']:<18} {entry['members']:>5}"
+            f" {mean.value:>11.5g} {mean.expected:>11.5g} {sd.value:>10.4g} {sd.expected:>10.4g}"
             f" {entry['clipped']:>9.2e} {inside:>9}  {method}"
         )
     yield from numbers["notes"]

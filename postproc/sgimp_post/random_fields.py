@@ -154,7 +154,7 @@ class RandomFields:
     seed: int
     plan: str
     realizations: int
-    #: Shift of the mean of the first Gaussian field in its standard deviations (importance sampling).
+    #: Of importance sampling: shift of the mean of the first Gaussian field, in its sd; else 0.
     tilt: float
     #: Of the solver, in which the program keeps the properties.
     precision: str

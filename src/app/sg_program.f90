@@ -10,6 +10,7 @@ module sg_program
   use sg_errors, only: error_t, EXIT_BAD_INPUT, EXIT_INTERNAL, EXIT_OK, raise
   use sg_estimate, only: estimate_text, listing_text
   use sg_key_listing, only: print_defaults, print_keys
+  use sg_kinds, only: wp
   use sg_plan, only: create_plan, plan_t
   use sg_posix, only: read_text
   use sg_read_config, only: read_variants
@@ -17,6 +18,7 @@ module sg_program
   use sg_resolved, only: compare_configs, identity_text, resolved_text
   use sg_study, only: variant_t
   use sg_text, only: to_text
+  use sg_timer, only: wall_seconds
   use sg_version, only: GIT_HASH, VERSION
   use sg_write_fields, only: write_fields
   implicit none
@@ -33,8 +35,10 @@ contains
     type(options_t) :: options
     type(error_t), allocatable :: error
     character(len=:), allocatable :: text
+    real(wp) :: begin
 
     exit_code = EXIT_OK
+    begin = wall_seconds()
     call parse_command_line(arguments(), options, error)
     if (.not. allocated(error)) then
       if (options%help) then
@@ -47,7 +51,7 @@ contains
       else if (options%defaults) then
         call say(comm, print_defaults())
       else
-        call run_case(comm, options, exit_code, error)
+        call run_case(comm, options, begin, exit_code, error)
       end if
     end if
     if (allocated(error)) then
@@ -58,9 +62,11 @@ contains
   end subroutine run_program
 
   !> Everything that needs a case file.
-  subroutine run_case(comm, options, exit_code, error)
+  subroutine run_case(comm, options, begin, exit_code, error)
     type(comm_t), intent(in) :: comm
     type(options_t), intent(in) :: options
+    !> When the program began, as `wall_seconds` has it.
+    real(wp), intent(in) :: begin
     integer, intent(out) :: exit_code
     type(error_t), allocatable, intent(out) :: error
     type(variant_t), allocatable :: variants(:)
@@ -115,7 +121,9 @@ contains
     request%field_method = model%grounds(model%field_ground())%field_method()
     request%fields = model%grounds(model%field_ground())%field_records()
     request%overwrite = options%overwrite
-    request%walltime = options%walltime
+    ! Factors of large fields have taken their time by now.
+    if (options%walltime > 0.0_wp) request%walltime = max(options%walltime - (wall_seconds() - &
+      begin), tiny(begin))
     request%compare => compare_configs
     call run_ensemble(comm, request, model, exit_code, error)
   end subroutine run_case

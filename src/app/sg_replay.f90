@@ -4,9 +4,11 @@ module sg_replay
   use sg_collapse, only: collapse_model_t
   use sg_command_line, only: options_t
   use sg_errors, only: error_t, EXIT_BAD_INPUT, raise
+  use sg_field_record, only: field_record_t
   use sg_kinds, only: i8
   use sg_monitor, only: patient_monitor_t
-  use sg_outcome, only: COLUMN_COUNT, COLUMNS, outcome_t, status_text
+  use sg_outcome, only: COLUMN_COUNT, COLUMNS, FIELD_MAX, FIELD_MEAN, FIELD_MIN, outcome_t, &
+    status_text
   use sg_plan, only: plan_t
   use sg_snapshot, only: snapshot_name
   use sg_text, only: joined, to_text
@@ -49,6 +51,8 @@ contains
     integer, intent(in) :: case_index
     type(patient_monitor_t) :: monitor
     type(outcome_t) :: outcome
+    type(field_record_t), allocatable :: fields(:)
+    character(len=:), allocatable :: units
     integer(i8) :: id
     integer :: k
 
@@ -59,9 +63,13 @@ contains
     write (output_unit, '(a)') snapshot_name( &
       trim(model%plan%cases(case_index)%label), id)//': '//status_text(outcome%status)
     if (outcome%reason /= '') write (output_unit, '(a)') '  '//outcome%reason
+    allocate (fields, source=model%grounds(model%field_ground())%field_records())
     do k = 1, COLUMN_COUNT
-      write (output_unit, '(2x, a24, 1x, a, 1x, a)') COLUMNS(k)%name, &
-        to_text(outcome%values(k)), trim(COLUMNS(k)%units)
+      units = trim(COLUMNS(k)%units)
+      if (any(k == [FIELD_MEAN, FIELD_MIN, FIELD_MAX]) .and. size(fields) > 0) units = &
+        fields(1)%units
+      write (output_unit, '(2x, a24, 1x, a, 1x, a)') COLUMNS(k)%name, to_text(outcome%values(k)), &
+        units
     end do
     if (options%snapshots) write (output_unit, &
       '(a)') '  written to '//model%grounds(1)%config%output%directory//'/snapshots'

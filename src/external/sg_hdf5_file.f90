@@ -3,15 +3,16 @@
 !> m].
 module sg_hdf5_file
   use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_ptr
-  use hdf5, only: h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dcreate_f, h5dget_space_f, &
-    h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, h5fclose_f, h5fcreate_f, h5fopen_f, &
-    h5gclose_f, h5gcreate_f, h5gget_obj_info_idx_f, h5gn_members_f, h5kind_to_type, &
-    h5oclose_f, h5oopen_f, h5open_f, h5sclose_f, h5screate_f, h5screate_simple_f, &
-    h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
-    h5tclose_f, h5tcopy_f, h5tset_size_f, h5tset_strpad_f, H5F_ACC_RDONLY_F, &
-    H5F_ACC_TRUNC_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_NATIVE_CHARACTER, H5T_STR_NULLPAD_F, &
-    H5_INTEGER_KIND, H5_REAL_KIND, hid_t, hsize_t, size_t
+  use hdf5, only: h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dcreate_f, &
+    h5dget_space_f, h5dont_atexit_f, h5dopen_f, h5dread_f, h5dwrite_f, h5eset_auto_f, &
+    h5fclose_f, h5fcreate_f, h5fopen_f, h5gclose_f, h5gcreate_f, h5gget_obj_info_idx_f, &
+    h5gn_members_f, h5kind_to_type, h5oclose_f, h5oopen_f, h5open_f, h5sclose_f, h5screate_f, &
+    h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
+    h5sselect_hyperslab_f, h5tclose_f, h5tcopy_f, h5tset_size_f, h5tset_strpad_f, &
+    H5F_ACC_RDONLY_F, H5F_ACC_TRUNC_F, H5S_SCALAR_F, H5S_SELECT_SET_F, H5T_NATIVE_CHARACTER, &
+    H5T_STR_NULLPAD_F, H5_INTEGER_KIND, H5_REAL_KIND, hid_t, hsize_t, size_t
   use sg_errors, only: error_t, EXIT_BAD_INPUT, EXIT_INTERNAL, raise
+  use sg_hdf5_reason, only: system_reason
   use sg_kinds, only: i4, i8, sp, wp
   implicit none
   private
@@ -63,7 +64,8 @@ contains
     if (this%failed) call raise(error, EXIT_INTERNAL, this%failure, 'hdf5_file_t%create')
   end subroutine create
 
-  !> Starts the library, which prints its errors unless told otherwise.
+  !> Starts the library, which prints its errors unless told otherwise. It may not tidy up when the
+  !> program ends either: it has crashed then over a file that could not be closed (full disk).
   subroutine start(this, path)
     class(hdf5_file_t), intent(inout) :: this
     character(len=*), intent(in) :: path
@@ -71,6 +73,8 @@ contains
 
     this%failed = .false.
     this%path = path
+    ! Fails from the second time on, and has been heard by then.
+    call h5dont_atexit_f(status)
     call h5open_f(status)
     call look(this, status, 'the library')
     if (this%failed) return
@@ -183,7 +187,7 @@ contains
 
     if (status >= 0 .or. this%failed) return
     this%failed = .true.
-    this%failure = 'HDF5 cannot write '//what//' of '//this%path
+    this%failure = 'HDF5 cannot write '//what//' of '//this%path//system_reason()
   end subroutine look
 
   !> Its parent must exist.

@@ -194,7 +194,9 @@ int sg_make_directory(const char *path)
     if (!last && *mark != '/')
       continue;
     *mark = '\0';
-    if (mkdir(copy, 0777) != 0 && !(stat(copy, &status) == 0 && S_ISDIR(status.st_mode)))
+    if (mkdir(copy, 0777) == 0)
+      (void)sync_parent(copy);  /* where that is not allowed, it is left to the system */
+    else if (!(stat(copy, &status) == 0 && S_ISDIR(status.st_mode)))
       result = -errno;
     if (last)
       break;
@@ -267,14 +269,18 @@ void sg_sleep(double seconds)
   nanosleep(&pause, NULL);
 }
 
-/* CRC-32 (IEEE 802.3, reflected). */
+/* CRC-32 (IEEE 802.3, reflected), four bits at a time. */
 int32_t sg_crc32(const unsigned char *bytes, int64_t length)
 {
+  static const uint32_t table[16] = {
+    0x00000000u, 0x1db71064u, 0x3b6e20c8u, 0x26d930acu, 0x76dc4190u, 0x6b6b51f4u, 0x4db26158u,
+    0x5005713cu, 0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu, 0x9b64c2b0u, 0x86d3d2d4u,
+    0xa00ae278u, 0xbdbdf21cu};
   uint32_t crc = 0xffffffffu;
   for (int64_t i = 0; i < length; ++i) {
     crc ^= bytes[i];
-    for (int bit = 0; bit < 8; ++bit)
-      crc = (crc >> 1) ^ (0xedb88320u & (0u - (crc & 1u)));
+    crc = (crc >> 4) ^ table[crc & 15u];
+    crc = (crc >> 4) ^ table[crc & 15u];
   }
   return (int32_t)(crc ^ 0xffffffffu);
 }

@@ -252,6 +252,10 @@ contains
     real(wp) :: begin
 
     call this%sync_journal()
+    if (allocated(this%error)) then
+      error = this%error
+      return
+    end if
     begin = wall_seconds()
     call write_ensemble(this%directory, this%record, this%results, error)
     this%last_write = wall_seconds()

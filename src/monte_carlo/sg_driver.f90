@@ -51,7 +51,7 @@ module sg_driver
     type(field_record_t), allocatable :: fields(:)
     !> Throw away what the directory holds of earlier runs.
     logical :: overwrite = .false.
-    !> Wall clock limit of the whole run in s, counted from the start of the program; 0 = none.
+    !> Wall clock limit in s, counted from the call of `run_ensemble`; 0 = none.
     real(wp) :: walltime = 0.0_wp
     !> `compare_configs` of sg_resolved; without it any difference of the texts counts.
     procedure(compare_interface), pointer, nopass :: compare => null()
@@ -255,7 +255,7 @@ contains
       if (damage(i)%is_tail) then
         call director%progress%say('the end of the journal was cut off: '// &
           to_text(damage(i)%length)//' bytes removed')
-      else if (is_missing(director, damage(i))) then
+      else if (done < director%plan%total() .and. is_missing(director, damage(i))) then
         call director%progress%say('a damaged record of the journal is left out: '// &
           damaged_name(director, damage(i))//', which is computed again')
       end if
@@ -329,7 +329,11 @@ contains
     director%record%state = 'complete'
     if (exit_code == EXIT_STOPPED_EARLY) director%record%state = 'stopped'
     call director%write_results(error)
-    if (allocated(director%error)) error = director%error
+    if (allocated(error)) then
+      exit_code = error%code
+      director%record%state = 'stopped'
+      director%stop_reason = error%message
+    end if
     call tell_cases(director)
     call tell_end(director, done, failed, exit_code)
     ! The request to stop is met: the same command goes on.
@@ -346,7 +350,11 @@ contains
     text = to_text(done)//' of '//to_text(director%plan%total())//' members done, '// &
            to_text(failed)//' failed, '//text_of_duration(wall_seconds() - director%start)
     select case (exit_code)
-    case (EXIT_STOPPED_EARLY)
+    case (EXIT_OK)
+      call director%progress%say('complete: '//text)
+    case (EXIT_TOO_MANY_FAILED)
+      call director%progress%say('complete, but more members failed than allowed: '//text)
+    case default
       call director%progress%say('stopped by '//director%stop_reason//': '//text// &
         '; the same command goes on')
       do i = 1, size(director%results)
@@ -356,10 +364,6 @@ contains
             id_list(.not. r%present(range(1):range(2)), range(1)))
         end associate
       end do
-    case (EXIT_TOO_MANY_FAILED)
-      call director%progress%say('complete, but more members failed than allowed: '//text)
-    case default
-      call director%progress%say('complete: '//text)
     end select
     call director%progress%tell('end', '"state":'//json_text(director%record%state)//',"done":'// &
       to_text(done)//',"failed":'//to_text(failed)//',"exit_code":'//to_text(exit_code))

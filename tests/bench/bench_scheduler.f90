@@ -5,7 +5,7 @@
 !> into the present directory. Prints; judges nothing.
 program bench_scheduler
   use sg_comm, only: comm_t
-  use sg_ensemble, only: case_geometry_t, case_results_t, ENSEMBLE_NAME, run_record_t, &
+  use sg_ensemble, only: case_results_t, ENSEMBLE_NAME, run_record_t, &
     write_ensemble
   use sg_errors, only: error_t
   use sg_journal, only: JOURNAL_NAME
@@ -15,7 +15,7 @@ program bench_scheduler
   use sg_posix, only: remove_file
   use sg_scheduler, only: run_members
   use sg_timer, only: wall_seconds
-  use sleeping_members, only: counting_director_t, make_row, PROFILE_COLUMNS, &
+  use sleeping_members, only: counting_director_t, make_record, make_row, row_geometry, &
     sleeping_model_t
   implicit none
 
@@ -136,15 +136,14 @@ contains
     type(outcome_t) :: outcome
     type(error_t), allocatable :: error
     real(wp) :: seconds
-    integer :: i, k, id
+    integer :: k, id
 
     if (comm%rank() /= 0) return
     do k = 1, CASES
       results(k)%label = 'case_'//achar(iachar('a') + k)
       results(k)%acf = 'snx'
       results(k)%distribution = 'normal'
-      call results(k)%init(int(MEMBERS_PER_CASE, i8), case_geometry_t(profile_x=[(0.125_wp*i, i=1, &
-        PROFILE_COLUMNS)]))
+      call results(k)%init(int(MEMBERS_PER_CASE, i8), row_geometry())
       do id = 1, MEMBERS_PER_CASE
         call make_row(k, int(id, i8), outcome)
         call results(k)%put(outcome)
@@ -159,23 +158,6 @@ contains
     print '(a, i0, a, f8.3, a)', ENSEMBLE_NAME//' of ', CASES*MEMBERS_PER_CASE, ' members: ', &
       seconds, ' s'
   end subroutine time_ensemble
-
-  subroutine make_record(record)
-    type(run_record_t), intent(out) :: record
-
-    record%case_text = '&case /'
-    record%resolved = '&case /'
-    record%host = ''
-    record%started = ''
-    record%ended = ''
-    record%state = 'bench'
-    record%config_hash = ''
-    record%field_method = ''
-    record%identity = ''
-    record%members = ''
-    record%sampling = ''
-    allocate (record%fields(0))
-  end subroutine make_record
 
   !> What rank 0 does for one row that waits, but for keeping it: look, receive, unpack, and a new
   !> task.

@@ -1,6 +1,7 @@
 !> Members that sleep for a known time, and a director that only counts them: for measurements of
 !> the scheduler.
 module sleeping_members
+  use sg_ensemble, only: case_geometry_t, run_record_t
   use sg_errors, only: error_t
   use sg_journal, only: journal_t
   use sg_kinds, only: i8, wp
@@ -13,7 +14,7 @@ module sleeping_members
   implicit none
   private
 
-  public :: counting_director_t, make_row, PROFILE_COLUMNS, sleeping_model_t
+  public :: counting_director_t, make_record, make_row, row_geometry, sleeping_model_t
 
   !> Columns of the paper's profile.
   integer, parameter :: PROFILE_COLUMNS = 160
@@ -81,6 +82,32 @@ contains
     outcome%values = 0.0_wp
     outcome%height = 0.0
   end subroutine make_row
+
+  !> What ensemble.h5 says of such a run: the least that it wants to be said.
+  subroutine make_record(record)
+    type(run_record_t), intent(out) :: record
+
+    record%case_text = '&case /'
+    record%resolved = '&case /'
+    record%host = ''
+    record%started = ''
+    record%ended = ''
+    record%state = 'bench'
+    record%config_hash = ''
+    record%field_method = ''
+    record%sampling = ''
+    allocate (record%fields(0))
+    record%identity = ''
+    record%members = ''
+  end subroutine make_record
+
+  !> Columns of the profile, as many as the paper's grid has.
+  function row_geometry() result(geometry)
+    type(case_geometry_t) :: geometry
+    integer :: i
+
+    geometry%profile_x = [(0.125_wp*(i - 0.5_wp), i=1, PROFILE_COLUMNS)]
+  end function row_geometry
 
   !> From now on rows go into a new journal in the present directory.
   subroutine keep_journal(this, error)
