@@ -106,6 +106,7 @@ contains
     type(case_geometry_t) :: geometry
     integer :: i
 
+    allocate (geometry%profile_x(PROFILE_COLUMNS))
     geometry%profile_x = [(0.125_wp*(i - 0.5_wp), i=1, PROFILE_COLUMNS)]
   end function row_geometry
 

@@ -1,12 +1,17 @@
 """A study of any key: its cases are what runs of their own are, byte for byte; twins of a control variate change
 nothing of their cases; runs of disjoint members are the parts of the whole, and so is what is left after a stop."""
 
+import pathlib
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 from common import Program, arguments, check, columns
 
 program = Program(arguments())
 MEMBERS = 6
+POST = pathlib.Path(__file__).parents[2] / "postproc"
 
 
 def case(name, study, *changes):
@@ -19,6 +24,14 @@ def case(name, study, *changes):
     path = program.root / f"{name}.nml"
     path.write_text(text)
     return path
+
+
+def post(expect, *words):
+    """Runs the post-processor and returns what it printed."""
+    code = f"import sys; sys.path.insert(0, {str(POST)!r}); from sgimp_post.cli import main; sys.exit(main())"
+    done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, check=False)
+    check(done.returncode == expect, f"sgimp-post {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
 
 
 def check_part(whole, label, part, other, what):
@@ -80,6 +93,20 @@ with h5py.File(program.root / "plain" / "ensemble.h5") as whole:
 text = program.run("first", 2, case=plain)
 check("complete: 9 of 9 members" in text, f"a part does not become the whole:\n{text}")
 check(columns(program.root / "first") == columns(program.root / "plain"), "a part became another whole")
+
+# Joined again: equal to the whole, also for the program, which finds nothing missing.
+program.run("third", 2, "--members", "1-4", case=plain)
+post(0, "merge", program.root / "third", program.root / "second", "--out", program.root / "merged")
+check(columns(program.root / "merged") == columns(program.root / "plain"), "merged parts are another whole")
+text = program.run("merged", 1, case=plain)
+check("resumed: 9 members are there, 0 are missing" in text, f"the program does not take the merged run:\n{text}")
+check(columns(program.root / "merged") == columns(program.root / "plain"), "the program changed the merged run")
+text = post(2, "merge", program.root / "third", program.root / "plain", "--out", program.root / "twice")
+check("both have 1-4 of base" in text, f"members that are there twice:\n{text}")
+text = post(2, "merge", program.root / "third", program.root / "twins", "--out", program.root / "other")
+check("control_variate" in text, f"another configuration:\n{text}")
+check(not (program.root / "twice").exists() and not (program.root / "other").exists(), "refused, but written")
+
 text = program.run("nothing", 2, "--members", "7-9", case=plain, expect=2)
 check("there is no such member" in text, f"members that are not there:\n{text}")
 print("studies, twins and ranges of members")
