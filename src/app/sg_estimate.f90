@@ -23,6 +23,8 @@ module sg_estimate
 
   !> Steps that are run to learn the speed of this machine.
   integer, parameter :: TRIAL_STEPS = 100
+  !> Of a long list, so many are shown.
+  integer, parameter :: SHOWN = 6
   !> The flowing phase costs up to this much more than the first steps.
   real(wp), parameter :: FLOW_FACTOR = 1.5_wp
 
@@ -49,6 +51,9 @@ contains
       if (allocated(error)) return
       if (v == 1) then
         text = more
+      else if (v > SHOWN) then
+        if (v == SHOWN + 1) text = text//line('                ... and '//to_text(size(variants) &
+          - SHOWN)//' variants more')
       else
         text = text//line('another variant '//trim(adjustl(variants(v)%varied//merge( &
           ' (control variate)', '                  ', variants(v)%twin_of > 0)))//': '// &
@@ -183,7 +188,6 @@ contains
   pure function case_list(plan) result(text)
     type(plan_t), intent(in) :: plan
     character(len=:), allocatable :: text
-    integer, parameter :: SHOWN = 6
     integer :: k
 
     text = ''
