@@ -69,7 +69,7 @@ def replay(label, member, table, *options):
     words = [line.split() for line in lines if re.fullmatch(r"  \w+ +\S+ \S+", line)]
     printed = {word[0]: float(word[1]) for word in words if word[0] in table}
     compared = [column for column in printed if column != "seconds"]
-    check(len(compared) == 22, f"{len(compared)} columns are printed:\n{text}")
+    check(len(compared) == 23, f"{len(compared)} columns are printed:\n{text}")
     for column in compared:
         row = float(table[column][member - 1])
         check(same(row, printed[column]), f"{name}, {column}: {printed[column]!r}, in the run {row!r}")
