@@ -13,6 +13,7 @@ module sg_estimate
   use sg_scene, only: build_scene, scene_t
   use sg_simulate, only: simulate
   use sg_text, only: text_of_duration, to_text
+  use sg_threads, only: usable_cores
   use sg_variation, only: variation_t
   implicit none
   private
@@ -60,6 +61,8 @@ contains
       ' s, wave speed '//to_text(scene%wave_speed, 4)//' m/s')//line( &
       'kernel          '//trim(config%solver%scheme)//' with '//trim(config%solver%weighting)// &
       ' weights in '//trim(config%solver%precision)//' precision')//line( &
+      'threads         '//to_text(config%solver%threads)//' in each rank, '// &
+      to_text(usable_cores())//' cores for this one')//line( &
       'steps           '//to_text(steps_needed)//' or more to end_time = '// &
       to_text(config%solver%end_time)// &
       ' s, fewer if it comes to rest')//line( &
@@ -69,7 +72,7 @@ contains
       'one member      about '//text_of_duration(member_seconds)//' ('// &
       to_text(1.0e9_wp*step_seconds/scene%particles%count, &
       3)//' ns per point and step here and now)')//line( &
-      'all             about '//to_text(members*member_seconds/3600.0_wp, &
+      'all             about '//to_text(members*member_seconds*config%solver%threads/3600.0_wp, &
       3)//' core-hours')//line( &
       'disk            about '//to_text(megabytes, 3)//' MB, snapshots not counted')//line( &
       'directory       '//config%output%directory)

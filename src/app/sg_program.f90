@@ -16,6 +16,7 @@ module sg_program
   use sg_replay, only: choose_member, replay_member
   use sg_resolved, only: compare_configs, resolved_text
   use sg_text, only: to_text
+  use sg_threads, only: core_set, threads_warning
   use sg_version, only: GIT_HASH, VERSION
   use sg_write_fields, only: write_fields
   implicit none
@@ -73,6 +74,7 @@ contains
     call load_case(comm, options%case_file, text, config, error)
     if (allocated(error)) return
     if (options%output /= '') config%output%directory = options%output
+    request%warning = threads_warning(config%solver%threads, comm%count_alike(core_set()))
     call create_plan(config, plan)
     if (options%realization > 0 .and. options%write_fields == '') then
       call choose_member(plan, options, case_index, error)
@@ -80,6 +82,8 @@ contains
     if (allocated(error)) return
     if (options%check) then
       if (comm%rank() == 0) call say_estimate(comm, config, plan, error)
+      if (request%warning /= '' .and. .not. allocated(error)) call say(comm, &
+        'warning         '//request%warning)
       if (options%realization > 0 .and. .not. allocated(error)) call say(comm, &
         'realization     '//to_text(options%realization)//' of '// &
         trim(plan%cases(case_index)%label)//' can be computed by itself')

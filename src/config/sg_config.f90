@@ -78,6 +78,7 @@ module sg_config
 
   type :: solver_config_t
     character(len=NAME_LENGTH) :: weighting, scheme, transfer, anti_locking, precision
+    integer :: threads
     real(wp) :: flip
     real(wp) :: cfl
     !> Fixed time step in s, or 0: from the CFL number.

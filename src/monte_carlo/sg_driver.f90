@@ -52,6 +52,8 @@ module sg_driver
     !> points, in m.
     real(wp) :: toe = 0.0_wp, initial_height = 0.0_wp, initial_width = 0.0_wp
     real(wp) :: point_spacing = 0.0_wp
+    !> Said once when the run starts; may be empty.
+    character(len=:), allocatable :: warning
     !> Throw away what the directory holds of earlier runs.
     logical :: overwrite = .false.
     !> Wall clock limit of the whole run in s, counted from the start of the program; 0 = none.
@@ -253,6 +255,9 @@ contains
       to_text(director%record%ranks)//' ranks, into '//director%directory)
     if (director%record%field_method /= '') then
       call director%progress%say('random field: '//director%record%field_method)
+    end if
+    if (allocated(request%warning)) then
+      if (request%warning /= '') call director%progress%say('warning: '//request%warning)
     end if
     if (resumed > 0) call director%progress%say('resumed: '//to_text(done)// &
       ' members are there, '//to_text(director%plan%total() - done)//' are missing')
