@@ -68,8 +68,8 @@ module sg_grid
     !> total_store(total_start).
     real(wp), allocatable :: total_store(:), motion_store(:)
     integer :: total_start, motion_start
-    !> Last node of total_store. Those from `first_spare` on lie nowhere, SPARE for each thread: what
-    !> it leaves to other threads is thrown away there.
+    !> Last node of total_store. Those from `first_spare` on lie nowhere, SPARE for each thread:
+    !> what it leaves to other threads is thrown away there.
     integer :: last_node, first_spare
     integer :: threads = 1
     !> Window of nodes that points can have touched: i_first, i_last, j_first, j_last.
@@ -239,11 +239,16 @@ contains
 
     associate (total => this%total_store(this%total_start:), &
       motion => this%motion_store(this%motion_start:))
-      !$omp parallel do num_threads(this%threads) schedule(static) if(this%threads > 1)
-      do thread = 1, this%threads
-        call integrate_nodes(strip(this, thread), this%least_mass, time_step, gravity, damping, &
+      if (this%threads == 1) then ! also to one thread a parallel region costs something
+        call integrate_nodes(this%window, this%least_mass, time_step, gravity, damping, &
           this%x%last, this%y%last, total, motion, damping_work)
-      end do
+      else
+        !$omp parallel do num_threads(this%threads) schedule(static)
+        do thread = 1, this%threads
+          call integrate_nodes(strip(this, thread), this%least_mass, time_step, gravity, damping, &
+            this%x%last, this%y%last, total, motion, damping_work)
+        end do
+      end if
       call apply_conditions(this%conditions, this%window, this%least_mass, this%x%last, &
         this%y%last, total, motion, losses%walls)
     end associate
@@ -309,11 +314,15 @@ contains
 
     associate (total => this%total_store(this%total_start:), &
       motion => this%motion_store(this%motion_start:))
-      !$omp parallel do num_threads(this%threads) schedule(static) if(this%threads > 1)
-      do thread = 1, this%threads
-        call divide_momentum(strip(this, thread), this%least_mass, this%x%last, this%y%last, &
-          total, motion)
-      end do
+      if (this%threads == 1) then
+        call divide_momentum(this%window, this%least_mass, this%x%last, this%y%last, total, motion)
+      else
+        !$omp parallel do num_threads(this%threads) schedule(static)
+        do thread = 1, this%threads
+          call divide_momentum(strip(this, thread), this%least_mass, this%x%last, this%y%last, &
+            total, motion)
+        end do
+      end if
       call hold_conditions(this%conditions, this%window, this%x%last, this%y%last, motion)
     end associate
   end subroutine find_velocity
@@ -354,11 +363,15 @@ contains
     type(grid_t), intent(inout) :: this
     integer :: thread
 
-    !$omp parallel do num_threads(this%threads) schedule(static) if(this%threads > 1)
-    do thread = 1, this%threads
-      call clear_nodes(strip(this, thread), this%x%last, this%y%last, &
-        this%total_store(this%total_start:))
-    end do
+    if (this%threads == 1) then
+      call clear_nodes(this%window, this%x%last, this%y%last, this%total_store(this%total_start:))
+    else
+      !$omp parallel do num_threads(this%threads) schedule(static)
+      do thread = 1, this%threads
+        call clear_nodes(strip(this, thread), this%x%last, this%y%last, &
+          this%total_store(this%total_start:))
+      end do
+    end if
   end subroutine clear_sums
 
   pure subroutine clear_nodes(window, nx, ny, total)
