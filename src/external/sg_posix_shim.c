@@ -245,6 +245,9 @@ void sg_host_name(char *text, int capacity)
   text[capacity - 1] = '\0';
 }
 
+/* 1: the loops that threads share are compiled with OpenMP. */
+int sg_has_threads(void) { return SGIMP_HAS_THREADS; }
+
 /* Cores that this process may run on; 0: nobody says. */
 int sg_usable_cores(void)
 {

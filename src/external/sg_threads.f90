@@ -8,6 +8,12 @@ module sg_threads
   public :: has_threads, core_set, usable_cores, threads_warning
 
   interface
+    pure function sg_has_threads() bind(c) result(has)
+      import :: c_int
+      implicit none
+      integer(c_int) :: has
+    end function sg_has_threads
+
     function sg_usable_cores() bind(c) result(number)
       import :: c_int
       implicit none
@@ -27,8 +33,7 @@ contains
   pure function has_threads() result(has)
     logical :: has
 
-    has = .false.
-!$ has = .true.
+    has = sg_has_threads() == 1
   end function has_threads
 
   !> Cores that this process may run on, which a launcher can have bound to some; 0: the operating
