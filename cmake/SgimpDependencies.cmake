@@ -53,6 +53,9 @@ if(NOT TARGET GSL::gsl)
   sgimp_missing("GNU Scientific Library" "libgsl-dev" "gsl")
 endif()
 
+# Comes with the compiler; without it `&solver threads` can only be 1.
+find_package(OpenMP QUIET COMPONENTS Fortran)
+
 if(SGIMP_MISSING)
   list(JOIN SGIMP_MISSING "\n" SGIMP_MISSING)
   message(FATAL_ERROR

@@ -13,7 +13,8 @@ set(SGIMP_TEST_ENVIRONMENT
   PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
   PRTE_MCA_hwloc_default_binding_policy=none
   OPENBLAS_NUM_THREADS=1
-  OMP_NUM_THREADS=1)
+  OMP_NUM_THREADS=1
+  OMP_WAIT_POLICY=passive)
 
 # _sgimp_set_test_properties(NAME label ranks timeout)
 function(_sgimp_set_test_properties name label ranks timeout)

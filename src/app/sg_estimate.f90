@@ -15,6 +15,7 @@ module sg_estimate
   use sg_stop_rule, only: make_stop_rule, RULE_COUNT, stop_rule_t
   use sg_study, only: variant_t
   use sg_text, only: text_of_duration, to_text
+  use sg_threads, only: usable_cores
   use sg_variation, only: variation_t
   implicit none
   private
@@ -40,7 +41,7 @@ contains
     character(len=:), allocatable :: more
     type(stop_rule_t) :: rule
     character(len=:), allocatable :: bound
-    real(wp) :: seconds(size(variants)), megabytes
+    real(wp) :: seconds(size(variants)), core_seconds, megabytes
     integer(i8) :: members
     integer :: k, v
 
@@ -66,8 +67,12 @@ contains
     bound = 'about '
     if (rule%rule /= RULE_COUNT) bound = 'at most about '
     megabytes = 0.0_wp
+    core_seconds = 0.0_wp
     do k = 1, size(plan%cases)
-      associate (grid => variants(plan%cases(k)%variant)%config%grid)
+      associate (grid => variants(plan%cases(k)%variant)%config%grid, &
+        threads => variants(plan%cases(k)%variant)%config%solver%threads)
+        core_seconds = core_seconds + real(plan%members_of(k)*threads, wp) &
+          *seconds(plan%cases(k)%variant)
         megabytes = megabytes + real(plan%members_of(k), wp)*(8.0_wp*COLUMN_COUNT + 4.0_wp &
           *(grid%x_max - grid%x_min)/grid%cell_size + 32.0_wp)*2.0_wp*1.0e-6_wp
       end associate
@@ -76,8 +81,7 @@ contains
       'members         '//to_text(members)//' in '//to_text(size(plan%cases))//' cases: '// &
       case_list(plan))//line( &
       'stop rule       '//rule%in_words())//line( &
-      'all             '//bound//to_text(sum([(plan%members_of(k)*seconds(plan%cases(k)%variant), &
-      k=1, size(plan%cases))])/3600.0_wp, 3)//' core-hours')//line( &
+      'all             '//bound//to_text(core_seconds/3600.0_wp, 3)//' core-hours')//line( &
       'disk            about '//to_text(megabytes, 3)//' MB, snapshots not counted')//line( &
       'directory       '//variants(1)%config%output%directory)
   end subroutine estimate_text
@@ -113,6 +117,8 @@ contains
       ' s, wave speed '//to_text(scene%wave_speed, 4)//' m/s')//line( &
       'kernel          '//trim(config%solver%scheme)//' with '//trim(config%solver%weighting)// &
       ' weights in '//trim(config%solver%precision)//' precision')//line( &
+      'threads         '//to_text(config%solver%threads)//' in each rank, '// &
+      to_text(usable_cores())//' cores for this one')//line( &
       'steps           '//to_text(steps_needed)//' or more to end_time = '// &
       to_text(config%solver%end_time)// &
       ' s, fewer if it comes to rest')//line( &

@@ -18,6 +18,7 @@ module sg_program
   use sg_resolved, only: compare_configs, identity_text, resolved_text
   use sg_study, only: variant_t
   use sg_text, only: to_text
+  use sg_threads, only: core_set, threads_warning
   use sg_timer, only: wall_seconds
   use sg_version, only: GIT_HASH, VERSION
   use sg_write_fields, only: write_fields
@@ -82,6 +83,8 @@ contains
     do v = 1, size(variants)
       if (options%output /= '') variants(v)%config%output%directory = options%output
     end do
+    request%warning = threads_warning(maxval([(variants(v)%config%solver%threads, v=1, &
+      size(variants))]), comm%count_alike(core_set()))
     call create_plan(variants, plan)
     call limit_plan(options, variants(1)%config%monte_carlo%stop_rule, plan, error)
     if (options%realization > 0 .and. options%write_fields == '' .and. .not. allocated(error)) then
@@ -93,6 +96,8 @@ contains
       return
     else if (options%check) then
       if (comm%rank() == 0) call say_estimate(comm, variants, plan, error)
+      if (request%warning /= '' .and. .not. allocated(error)) call say(comm, &
+        'warning         '//request%warning)
       if (options%realization > 0 .and. .not. allocated(error)) call say(comm, &
         'realization     '//to_text(options%realization)//' of '// &
         trim(plan%cases(case_index)%label)//' can be computed by itself')

@@ -10,6 +10,7 @@ module sg_check_config
   use sg_namelist, only: namelist_t
   use sg_polygon, only: corners_are_distinct, polygon_area, polygon_is_simple
   use sg_text, only: to_text
+  use sg_threads, only: has_threads
   implicit none
   private
 
@@ -340,6 +341,10 @@ contains
       if (desk%config%solver%transfer == 'tpic' .and. desk%config%solver%weighting == 'linear') then
         call desk%fault('solver', 1, 'transfer', "'tpic' is not stable with weighting = 'linear'")
       end if
+    end if
+    if (desk%good('solver', 1, 'threads')) then
+      if (desk%config%solver%threads > 1 .and. .not. has_threads()) call desk%fault('solver', 1, &
+        'threads', 'this program was built without OpenMP (allowed: 1)')
     end if
     if (.not. desk%good('solver', 1, 'time_step end_time')) return
     associate (solver => desk%config%solver)

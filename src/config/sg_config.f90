@@ -80,6 +80,7 @@ module sg_config
     !> What computes a member.
     character(len=NAME_LENGTH) :: model
     character(len=NAME_LENGTH) :: weighting, scheme, transfer, anti_locking, precision
+    integer :: threads
     real(wp) :: flip
     real(wp) :: cfl
     !> Fixed time step in s, or 0: from the CFL number.

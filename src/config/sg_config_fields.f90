@@ -271,6 +271,7 @@ contains
     call visitor%visit('flip', config%solver%flip)
     call visitor%visit('anti_locking', config%solver%anti_locking)
     call visitor%visit('precision', config%solver%precision)
+    call visitor%visit('threads', config%solver%threads)
     call visitor%visit('time_step', config%solver%time_step)
     call visitor%visit('cfl', config%solver%cfl)
     call visitor%visit('end_time', config%solver%end_time)

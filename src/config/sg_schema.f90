@@ -260,6 +260,8 @@ module sg_schema
     'incompressible behaviour)'), &
     key_t('solver', 'precision', KIND_WORD, default='double', choices='double single', &
     meaning='Of the numbers of points and nodes; times, energies and fields are double'), &
+    key_t('solver', 'threads', KIND_INTEGER, default='1', range='[1,1024]', identity=.false., &
+    meaning='Cores that work on one member together, in each rank; the results are the same'), &
     key_t('solver', 'time_step', KIND_REAL, unit='s', range='(0,)', &
     meaning='Fixed time step; overrides cfl'), &
     key_t('solver', 'cfl', KIND_REAL, unit='1', default='0.4', range='(0,1.5]', &

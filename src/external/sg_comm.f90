@@ -3,9 +3,11 @@
 !> the calls is not looked at here.
 module sg_comm
   use mpi_f08, only: MPI_Abort, MPI_Allreduce, MPI_Barrier, MPI_Bcast, MPI_BYTE, MPI_Comm, &
-    MPI_Comm_rank, MPI_Comm_size, MPI_COMM_WORLD, MPI_Finalize, MPI_Get_count, MPI_Init, &
-    MPI_INTEGER, MPI_Iprobe, MPI_LOR, MPI_LOGICAL, MPI_MAX, MPI_MIN, MPI_DOUBLE_PRECISION, &
-    MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_Recv, MPI_Send, MPI_Status
+    MPI_Comm_free, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split, MPI_Comm_split_type, &
+    MPI_COMM_TYPE_SHARED, MPI_COMM_WORLD, MPI_Finalize, MPI_Get_count, &
+    MPI_INFO_NULL, MPI_Init_thread, MPI_INTEGER, MPI_Iprobe, MPI_LOR, MPI_LOGICAL, MPI_MAX, &
+    MPI_MIN, MPI_DOUBLE_PRECISION, MPI_ANY_SOURCE, MPI_ANY_TAG, MPI_Recv, MPI_Send, MPI_Status, &
+    MPI_THREAD_FUNNELED
   use sg_errors, only: error_t, raise
   use sg_kinds, only: i1, wp
   implicit none
@@ -30,6 +32,7 @@ module sg_comm
     procedure :: broadcast_integer
     procedure :: broadcast_reals
     procedure :: any_true
+    procedure :: count_alike
     procedure :: max_real
     procedure :: agree
     procedure :: probe
@@ -39,11 +42,12 @@ module sg_comm
 
 contains
 
-  !> Starts MPI on all ranks.
+  !> Starts MPI on all ranks. Threads of a rank, if any, leave it to the first to call MPI.
   subroutine init(this)
     class(comm_t), intent(inout) :: this
+    integer :: provided
 
-    call MPI_Init()
+    call MPI_Init_thread(MPI_THREAD_FUNNELED, provided)
     this%handle = MPI_COMM_WORLD
     call ask_size(this)
   end subroutine init
@@ -122,6 +126,22 @@ contains
 
     call MPI_Bcast(values, size(values), MPI_DOUBLE_PRECISION, 0, this%handle)
   end subroutine broadcast_reals
+
+  !> Ranks on the machine of this one that have the same `value`, which is not negative, with this
+  !> one. Collective.
+  function count_alike(this, value) result(number)
+    class(comm_t), intent(in) :: this
+    integer, intent(in) :: value
+    integer :: number
+    type(MPI_Comm) :: machine, alike
+
+    call MPI_Comm_split_type(this%handle, MPI_COMM_TYPE_SHARED, this%own_rank, MPI_INFO_NULL, &
+      machine)
+    call MPI_Comm_split(machine, value, this%own_rank, alike)
+    call MPI_Comm_size(alike, number)
+    call MPI_Comm_free(alike)
+    call MPI_Comm_free(machine)
+  end function count_alike
 
   !> Whether `value` is true on any rank; the same answer everywhere.
   function any_true(this, value) result(any_of_them)

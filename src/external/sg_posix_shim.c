@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <libgen.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -244,6 +245,29 @@ void sg_host_name(char *text, int capacity)
   if (gethostname(text, (size_t)capacity) != 0)
     snprintf(text, (size_t)capacity, "unknown");
   text[capacity - 1] = '\0';
+}
+
+/* 1: the loops that threads share are compiled with OpenMP. */
+int sg_has_threads(void) { return SGIMP_HAS_THREADS; }
+
+/* Cores that this process may run on; 0: nobody says. */
+int sg_usable_cores(void)
+{
+  cpu_set_t set;
+  return sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 0;
+}
+
+/* A number >= 0 that is the same for the same set of cores. */
+int sg_core_set(void)
+{
+  cpu_set_t set;
+  uint32_t hash = 2166136261u;
+  if (sched_getaffinity(0, sizeof set, &set) != 0)
+    return 0;
+  for (int core = 0; core < CPU_SETSIZE; core++)
+    if (CPU_ISSET(core, &set))
+      hash = (hash ^ (uint32_t)core) * 16777619u;
+  return (int)(hash >> 1);
 }
 
 void sg_working_directory(char *text, int capacity)

@@ -35,16 +35,18 @@ contains
     this%total = 0.0_wp
   end subroutine clear
 
-  !> Adds `n` points at (x, y), m, of `volume`, m^2, with their `quantity`.
-  pure subroutine add(this, n, x, y, volume, quantity)
+  !> Adds `n` points at (x, y), m, of `volume`, m^2, with their `quantity`: those in the rows of
+  !> cells rows(1) to rows(2).
+  pure subroutine add(this, n, x, y, volume, quantity, rows)
     class(cell_average_t), intent(inout) :: this
-    integer, intent(in) :: n
+    integer, intent(in) :: n, rows(2)
     real(wp), intent(in) :: x(n), y(n), volume(n), quantity(n)
     integer :: p, i, j
 
     do p = 1, n
       i = cell_of(x(p), this%x)
       j = cell_of(y(p), this%y)
+      if (j < rows(1) .or. j > rows(2)) cycle
       this%total(:, i, j) = this%total(:, i, j) + volume(p)*[quantity(p), 1.0_wp]
     end do
   end subroutine add

@@ -4,6 +4,9 @@
 !> function of a point at a wall has its full stencil. Only nodes in the window around the points
 !> are touched. Whoever reads the sums last clears them, so that they are zero when points are next
 !> mapped.
+!>
+!> With threads, each has a strip of rows of nodes. What is summed over nodes is summed along rows
+!> first, so that no sum knows how the rows were shared out.
 module sg_grid
   use sg_boundary, only: apply_conditions, condition_t, create_prescribed, create_wall, &
     hold_conditions
@@ -17,6 +20,8 @@ module sg_grid
 
   public :: grid_t, losses_t, tally_t
 
+  !> Spare nodes of a thread: three are used, the fourth fills the cache line in single precision.
+  integer, parameter :: SPARE = 4
   !> Layers of nodes outside each wall.
   integer, parameter :: GHOST = 2
   !> Share of the smallest point mass below which a node counts as empty. Momentum over mass is
@@ -35,10 +40,11 @@ module sg_grid
     !> point can keep a velocity that the grid does not see; it moves nothing, and so does not count
     !> when rest is looked for.
     real(dp) :: motion_energy
-    !> Work of the stresses in this step, J/m.
-    real(dp) :: internal_work
+    !> Work of the stresses and of body forces other than gravity in this step, J/m.
+    real(dp) :: internal_work, force_work
   contains
     procedure :: reset => reset_tally
+    procedure :: add => add_tally
   end type tally_t
 
   !> Energy that left the nodes in a step, J/m.
@@ -62,11 +68,17 @@ module sg_grid
     !> total_store(total_start).
     real(wp), allocatable :: total_store(:), motion_store(:)
     integer :: total_start, motion_start
+    !> Last node of total_store. Those from `first_spare` on lie nowhere, SPARE for each thread:
+    !> what it leaves to other threads is thrown away there.
+    integer :: last_node, first_spare
+    integer :: threads = 1
     !> Window of nodes that points can have touched: i_first, i_last, j_first, j_last.
     integer :: window(4)
   contains
     procedure :: init => init_grid
     procedure :: set_window
+    procedure :: rows_of
+    procedure :: spare_node
     procedure :: integrate_momentum
     procedure :: find_velocity
     procedure :: remap_velocity
@@ -78,8 +90,8 @@ module sg_grid
 
 contains
 
-  subroutine reset_tally(this)
-    class(tally_t), intent(out) :: this
+  pure subroutine reset_tally(this)
+    class(tally_t), intent(inout) :: this
 
     this%x_min = huge(1.0_wp)
     this%x_max = -huge(1.0_wp)
@@ -90,22 +102,43 @@ contains
     this%wave_squared = 0.0_wp
     this%motion_energy = 0.0_wp
     this%internal_work = 0.0_wp
+    this%force_work = 0.0_wp
   end subroutine reset_tally
+
+  !> Adds what was found out about other points.
+  pure subroutine add_tally(this, other)
+    class(tally_t), intent(inout) :: this
+    type(tally_t), intent(in) :: other
+
+    this%x_min = min(this%x_min, other%x_min)
+    this%x_max = max(this%x_max, other%x_max)
+    this%y_min = min(this%y_min, other%y_min)
+    this%y_max = max(this%y_max, other%y_max)
+    this%speed_squared = max(this%speed_squared, other%speed_squared)
+    this%wave_squared = max(this%wave_squared, other%wave_squared)
+    this%kinetic_energy = this%kinetic_energy + other%kinetic_energy
+    this%motion_energy = this%motion_energy + other%motion_energy
+    this%internal_work = this%internal_work + other%internal_work
+    this%force_work = this%force_work + other%force_work
+  end subroutine add_tally
 
   !> `stretch` scales the cells (and with them the far walls) about the lower left corner: 0 for
   !> none.
-  !> `least_point_mass` is the mass of the lightest point, in kg/m.
-  subroutine init_grid(this, config, boundaries, stretch, least_point_mass)
+  !> `least_point_mass` is the mass of the lightest point, in kg/m. `threads` share the nodes, one
+  !> where it is absent.
+  subroutine init_grid(this, config, boundaries, stretch, least_point_mass, threads)
     class(grid_t), intent(out) :: this
     type(grid_config_t), intent(in) :: config
     type(boundary_config_t), intent(in) :: boundaries(:)
     real(dp), intent(in) :: stretch
     real(wp), intent(in) :: least_point_mass
+    integer, intent(in), optional :: threads
     real(dp) :: cell
     type(condition_t) :: walls(4)
     logical :: may_lift(4)
     integer :: nodes, k
 
+    if (present(threads)) this%threads = threads
     cell = config%cell_size*(1.0_dp + stretch)
     this%cell_size = real(cell, wp)
     this%x = create_axis(config%x_min, config%x_max, config%cell_size, cell, &
@@ -125,8 +158,10 @@ contains
           config%y_min] - GHOST*cell, cell)]
       end do
       this%window = [0, nx, 0, ny]
-      nodes = (nx + 1)*(ny + 1)
+      this%first_spare = (nx + 1)*(ny + 1)
     end associate
+    nodes = this%first_spare + SPARE*this%threads
+    this%last_node = nodes - 1
     this%least_mass = EMPTY_NODE*least_point_mass
     allocate (this%total_store(8*nodes + ALIGNMENT_SLACK), this%motion_store(8*nodes &
       + ALIGNMENT_SLACK))
@@ -159,9 +194,27 @@ contains
 
     this%window(1) = max(node_below(tally%x_min, this%x) - 1, 0)
     this%window(2) = min(node_below(tally%x_max, this%x) + 2, this%x%last)
-    this%window(3) = max(node_below(tally%y_min, this%y) - 1, 0)
-    this%window(4) = min(node_below(tally%y_max, this%y) + 2, this%y%last)
+    this%window(3:4) = this%rows_of(tally)
   end subroutine set_window
+
+  !> First and last row of nodes that the stencils of the points of the tally can reach.
+  pure function rows_of(this, tally) result(rows)
+    class(grid_t), intent(in) :: this
+    type(tally_t), intent(in) :: tally
+    integer :: rows(2)
+
+    ! Within the grid also where a position is not a number.
+    rows = [min(max(node_below(tally%y_min, this%y) - 1, 0), this%y%last_base), &
+      max(min(node_below(tally%y_max, this%y) + 2, this%y%last), 0)]
+  end function rows_of
+
+  !> The first of the three nodes where thread number `thread`, from 1, throws things away.
+  pure function spare_node(this, thread) result(node)
+    class(grid_t), intent(in) :: this
+    integer, intent(in) :: thread
+    integer :: node
+    node = this%first_spare + SPARE*(thread - 1)
+  end function spare_node
 
   !> The last node that is not above `position`, held within the grid.
   pure function node_below(position, axis) result(node)
@@ -181,29 +234,57 @@ contains
     !> In s, m/s^2, 1/s.
     real(wp), intent(in) :: time_step, gravity(2), damping
     type(losses_t), intent(out) :: losses
+    real(dp) :: damping_work(0:this%y%last)
+    integer :: thread, row
 
     associate (total => this%total_store(this%total_start:), &
       motion => this%motion_store(this%motion_start:))
-      call integrate_nodes(this%window, this%least_mass, time_step, gravity, damping, &
-        this%x%last, this%y%last, total, motion, losses%damping)
+      if (this%threads == 1) then ! also to one thread a parallel region costs something
+        call integrate_nodes(this%window, this%least_mass, time_step, gravity, damping, &
+          this%x%last, this%y%last, total, motion, damping_work)
+      else
+        !$omp parallel do num_threads(this%threads) schedule(static)
+        do thread = 1, this%threads
+          call integrate_nodes(strip(this, thread), this%least_mass, time_step, gravity, damping, &
+            this%x%last, this%y%last, total, motion, damping_work)
+        end do
+      end if
       call apply_conditions(this%conditions, this%window, this%least_mass, this%x%last, &
         this%y%last, total, motion, losses%walls)
-      call clear_nodes(this%window, this%x%last, this%y%last, total)
     end associate
+    do row = this%window(3), this%window(4)
+      losses%damping = losses%damping + damping_work(row)
+    end do
+    losses%damping = losses%damping*damping*time_step
+    call clear_sums(this)
   end subroutine integrate_momentum
 
+  !> The part of the window that `thread` has in loops over nodes.
+  pure function strip(this, thread) result(window)
+    type(grid_t), intent(in) :: this
+    integer, intent(in) :: thread
+    integer :: window(4)
+
+    window = this%window
+    associate (first => this%window(3), rows => this%window(4) - this%window(3) + 1)
+      window(3) = first + (thread - 1)*rows/this%threads
+      window(4) = first + thread*rows/this%threads - 1
+    end associate
+  end function strip
+
+  !> `damping_work` is kept row by row, without the factor damping*time_step.
   pure subroutine integrate_nodes(window, least_mass, time_step, gravity, damping, nx, ny, total, &
     motion, damping_work)
     integer, intent(in) :: window(4), nx, ny
     real(wp), intent(in) :: least_mass, time_step, gravity(2), damping
     real(wp), intent(in) :: total(8, 0:nx, 0:ny)
     real(wp), intent(inout) :: motion(8, 0:nx, 0:ny)
-    real(dp), intent(out) :: damping_work
+    real(dp), intent(inout) :: damping_work(0:ny)
     real(wp) :: mass, inverse_mass, vx, vy, dvx, dvy
     integer :: i, j
 
-    damping_work = 0.0_wp
     do j = window(3), window(4)
+      damping_work(j) = 0.0_dp
       do i = window(1), window(2)
         mass = total(1, i, j)
         if (mass > least_mass) then
@@ -217,23 +298,31 @@ contains
           motion(1:2, i, j) = [dvx, dvy]
           motion(3:8, i, j) = [vx + dvx, vy + dvy, vx + dvx, vy + dvy, vx + dvx, &
             vy + dvy]
-          damping_work = damping_work + mass*(vx*(vx + 0.5_wp*dvx) + vy*(vy + 0.5_wp*dvy))
+          damping_work(j) = damping_work(j) + mass*(vx*(vx + 0.5_wp*dvx) + vy*(vy + 0.5_wp*dvy))
         else
           motion(:, i, j) = 0.0_wp
         end if
       end do
     end do
-    damping_work = damping_work*damping*time_step
   end subroutine integrate_nodes
 
   !> motion(3:8) = p_i/m_i, thrice, with walls, before the stresses are updated (scheme usf). Keeps
   !> the sums.
   subroutine find_velocity(this)
     class(grid_t), intent(inout) :: this
+    integer :: thread
 
     associate (total => this%total_store(this%total_start:), &
       motion => this%motion_store(this%motion_start:))
-      call divide_momentum(this%window, this%least_mass, this%x%last, this%y%last, total, motion)
+      if (this%threads == 1) then
+        call divide_momentum(this%window, this%least_mass, this%x%last, this%y%last, total, motion)
+      else
+        !$omp parallel do num_threads(this%threads) schedule(static)
+        do thread = 1, this%threads
+          call divide_momentum(strip(this, thread), this%least_mass, this%x%last, this%y%last, &
+            total, motion)
+        end do
+      end if
       call hold_conditions(this%conditions, this%window, this%x%last, this%y%last, motion)
     end associate
   end subroutine find_velocity
@@ -244,7 +333,7 @@ contains
     class(grid_t), intent(inout) :: this
 
     call this%find_velocity()
-    call clear_nodes(this%window, this%x%last, this%y%last, this%total_store(this%total_start:))
+    call clear_sums(this)
   end subroutine remap_velocity
 
   !> motion = (old motion(3:4), p_i/m_i).
@@ -268,6 +357,22 @@ contains
       end do
     end do
   end subroutine divide_momentum
+
+  !> Clears the sums of the nodes in the window.
+  subroutine clear_sums(this)
+    type(grid_t), intent(inout) :: this
+    integer :: thread
+
+    if (this%threads == 1) then
+      call clear_nodes(this%window, this%x%last, this%y%last, this%total_store(this%total_start:))
+    else
+      !$omp parallel do num_threads(this%threads) schedule(static)
+      do thread = 1, this%threads
+        call clear_nodes(strip(this, thread), this%x%last, this%y%last, &
+          this%total_store(this%total_start:))
+      end do
+    end if
+  end subroutine clear_sums
 
   pure subroutine clear_nodes(window, nx, ny, total)
     integer, intent(in) :: window(4), nx, ny

@@ -223,7 +223,7 @@ contains
     end if
     here = counted_from(config, solver%particles%origin)
     call solver%grid%init(here%grid, here%boundaries, variation%cell_stretch, &
-      minval(solver%particles%mass))
+      minval(solver%particles%mass), config%solver%threads)
     call solver%start()
   end subroutine prepare
 

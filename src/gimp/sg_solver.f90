@@ -9,7 +9,13 @@
 !>   usf   stress first, from the velocity at the start of the step (Bardenhagen 2002).
 !>
 !> All are made of the same sweep with other parts of it switched on.
+!>
+!> With several threads a sweep has two parts: points are moved, a range of blocks to each thread,
+!> then mapped, a strip of rows of nodes to each thread. A thread maps all points that reach its
+!> strip, in their order, and throws away what they bring elsewhere. So every node receives the same
+!> numbers in the same order however many threads there are: results are the same to the last bit.
 module sg_solver
+  use sg_blocks, only: block_t, cut_into_blocks, share_out_rows, strip_t
   use sg_cell_average, only: cell_average_t
   use sg_config, only: config_t
   use sg_grid, only: grid_t, losses_t, tally_t
@@ -44,6 +50,9 @@ module sg_solver
     logical :: map_force = .false.
     !> Only adds up the volumetric strain rate, or the pressure, in the cells (anti-locking).
     logical :: average_divergence = .false., average_pressure = .false.
+  contains
+    procedure :: points_part
+    procedure :: nodes_part
   end type sweep_t
 
   type :: solver_t
@@ -70,6 +79,9 @@ module sg_solver
     real(dp) :: time = 0.0_dp
     type(grid_t) :: grid
     type(particles_t) :: particles
+    type(block_t), allocatable :: blocks(:)
+    !> What a sweep found out about each block; of size 0 for one thread.
+    type(tally_t), allocatable :: tallies(:)
     !> What the last step found out about the points.
     type(tally_t) :: tally
     !> Work of the stresses, and energy taken by damping and by the walls since the start, J/m.
@@ -83,6 +95,7 @@ module sg_solver
     procedure, private :: do_needless
     procedure, private :: limit_grid
     procedure, private :: sweep_points
+    procedure, private :: sweep_in_threads
     procedure, private :: sweep_block
     procedure, private :: find_weights
     procedure, private :: stretch_domains
@@ -164,6 +177,9 @@ contains
     this%force_work = 0.0_wp
     this%damping_work = 0.0_wp
     this%wall_work = 0.0_wp
+    this%blocks = cut_into_blocks(this%particles%bodies%first, this%particles%bodies%last)
+    if (allocated(this%tallies)) deallocate (this%tallies)
+    allocate (this%tallies(merge(size(this%blocks), 0, this%grid%threads > 1)))
     call note_all(this)
     call this%average_pressure()
     call this%sweep_points(sweep_t(map_momentum=.true., map_force=this%scheme /= SCHEME_USF), &
@@ -181,25 +197,26 @@ contains
   !> Bounds, energy and speeds of the initial state.
   subroutine note_all(this)
     type(solver_t), intent(inout) :: this
-    real(wp) :: value(BLOCK, 4)
-    integer :: first, last, body
+    type(tally_t) :: tally
+    integer :: k
 
     call this%tally%reset()
-    value = 0.0_wp
-    do body = 1, size(this%particles%bodies)
-      do first = this%particles%bodies(body)%first, this%particles%bodies(body)%last, BLOCK
-        last = min(first + BLOCK - 1, this%particles%bodies(body)%last)
-        associate (p => this%particles)
-          value(:last - first + 1, 1) = p%vx(first:last)
-          value(:last - first + 1, 2) = p%vy(first:last)
-          call move_points(last - first + 1, 0.0_wp, 1, value, p%mass(first), &
-            p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
-          if (size(p%density) > 0) call add_heavier(last - first + 1, 1, value, &
-            p%mass(first:last), p%vx(first:last), p%vy(first:last), this%tally)
-          this%tally%wave_squared = max(this%tally%wave_squared, wave_speed_squared(p, &
-            this%materials(p%bodies(body)%material), first, last))
-        end associate
-      end do
+    do k = 1, size(this%blocks)
+      call tally%reset()
+      associate (p => this%particles, first => this%blocks(k)%first, last => this%blocks(k)%last)
+        tally%x_min = minval(p%x(first:last))
+        tally%x_max = maxval(p%x(first:last))
+        tally%y_min = minval(p%y(first:last))
+        tally%y_max = maxval(p%y(first:last))
+        tally%speed_squared = maxval(p%vx(first:last)**2 + p%vy(first:last)**2)
+        tally%kinetic_energy = 0.5_wp*sum(p%mass(first:last)*(p%vx(first:last)**2 &
+          + p%vy(first:last)**2))
+        tally%motion_energy = tally%kinetic_energy
+        tally%wave_squared = wave_speed_squared(p, &
+          this%materials(p%bodies(this%blocks(k)%body)%material), first, last)
+      end associate
+      this%blocks(k)%rows = this%grid%rows_of(tally)
+      call this%tally%add(tally)
     end do
   end subroutine note_all
 
@@ -238,6 +255,7 @@ contains
     this%damping_work = this%damping_work + losses%damping
     this%wall_work = this%wall_work + losses%walls
     this%internal_work = this%internal_work + this%tally%internal_work
+    this%force_work = this%force_work + this%tally%force_work
     call this%limit_grid()
   end subroutine advance
 
@@ -277,33 +295,103 @@ contains
     class(solver_t), intent(inout) :: this
     type(sweep_t), intent(in) :: sweep
     real(wp), intent(in) :: time_step
-    integer :: body, first, last
+    type(tally_t) :: tally
+    integer :: k
 
-    do body = 1, size(this%particles%bodies)
-      do first = this%particles%bodies(body)%first, this%particles%bodies(body)%last, BLOCK
-        last = min(first + BLOCK - 1, this%particles%bodies(body)%last)
-        call this%sweep_block(sweep, time_step, this%particles%bodies(body), first, last)
+    if (this%grid%threads > 1) then
+      call this%sweep_in_threads(sweep, time_step)
+      return
+    end if
+    associate (all_rows => strip_t([0, this%grid%y%last], this%grid%first_spare))
+      do k = 1, size(this%blocks)
+        call tally%reset()
+        call this%sweep_block(sweep, time_step, this%blocks(k), all_rows, tally)
+        call this%tally%add(tally)
       end do
-    end do
+    end associate
   end subroutine sweep_points
 
-  !> One block of points of one body.
-  subroutine sweep_block(this, sweep, time_step, body, first, last)
+  !> The same in two parts. Tallies of blocks are added in the order of the blocks.
+  subroutine sweep_in_threads(this, sweep, time_step)
     class(solver_t), intent(inout) :: this
     type(sweep_t), intent(in) :: sweep
     real(wp), intent(in) :: time_step
-    type(body_points_t), intent(in) :: body
-    integer, intent(in) :: first, last
+    type(tally_t) :: tally
+    type(strip_t) :: strips(this%grid%threads), no_rows
+    type(sweep_t) :: part
+    integer :: k, thread
+    logical :: is_idle, is_home
+
+    part = sweep%points_part()
+    is_idle = .not. (part%update_velocity .or. part%update_stress .or. part%move_with > 0)
+    no_rows = strip_t([0, -1], this%grid%first_spare)
+    !$omp parallel do num_threads(this%grid%threads) schedule(static) private(tally)
+    do k = 1, size(this%blocks)
+      call tally%reset()
+      if (.not. is_idle) call this%sweep_block(part, time_step, this%blocks(k), no_rows, tally)
+      if (part%move_with > 0) this%blocks(k)%rows = this%grid%rows_of(tally)
+      this%tallies(k) = tally
+    end do
+    part = sweep%nodes_part()
+    strips%spare = [(this%grid%spare_node(thread), thread=1, size(strips))]
+    call share_out_rows(this%blocks, this%grid%y%last, strips)
+    !$omp parallel do num_threads(this%grid%threads) schedule(static) private(k, tally, is_home)
+    do thread = 1, this%grid%threads
+      do k = 1, size(this%blocks)
+        associate (here => strips(thread)%rows, reached => this%blocks(k)%rows)
+          if (reached(1) > here(2) .or. reached(2) < here(1)) cycle
+          ! Of the threads that map this block one keeps its tally.
+          is_home = reached(1) >= here(1)
+          call tally%reset()
+          if (is_home) tally = this%tallies(k)
+          call this%sweep_block(part, time_step, this%blocks(k), strips(thread), tally)
+          if (is_home) this%tallies(k) = tally
+        end associate
+      end do
+    end do
+    do k = 1, size(this%blocks)
+      call this%tally%add(this%tallies(k))
+    end do
+  end subroutine sweep_in_threads
+
+  !> What `this` does to points, whose blocks know nothing of one another.
+  pure function points_part(this) result(part)
+    class(sweep_t), intent(in) :: this
+    type(sweep_t) :: part
+
+    part = sweep_t(update_velocity=this%update_velocity, update_stress=this%update_stress, &
+      move_with=this%move_with)
+  end function points_part
+
+  !> What `this` adds to nodes and cells.
+  pure function nodes_part(this) result(part)
+    class(sweep_t), intent(in) :: this
+    type(sweep_t) :: part
+
+    part = sweep_t(map_momentum=this%map_momentum, map_force=this%map_force, &
+      average_divergence=this%average_divergence, average_pressure=this%average_pressure)
+  end function nodes_part
+
+  !> One block of points; maps to the nodes of `strip`, adds to `tally`.
+  subroutine sweep_block(this, sweep, time_step, points, strip, tally)
+    class(solver_t), intent(inout) :: this
+    type(sweep_t), intent(in) :: sweep
+    real(wp), intent(in) :: time_step
+    type(block_t), intent(in) :: points
+    type(strip_t), intent(in) :: strip
+    type(tally_t), intent(inout) :: tally
     type(weights_t) :: w
     real(wp) :: value(BLOCK, 4), gradient(BLOCK, 4), change(BLOCK)
     logical :: keep_gradient
-    integer :: n
+    integer :: first, last, n
 
+    first = points%first
+    last = points%last
     n = last - first + 1
-    associate (p => this%particles, g => this%grid)
+    associate (p => this%particles, g => this%grid, body => this%particles%bodies(points%body))
       if (sweep%average_pressure) then
         call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), &
-          0.5_wp*(p%sxx(first:last) + p%syy(first:last)))
+          0.5_wp*(p%sxx(first:last) + p%syy(first:last)), strip%rows)
         return
       end if
       call this%find_weights(first, last, w)
@@ -316,7 +404,7 @@ contains
       end if
       if (sweep%average_divergence) then
         call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), &
-          gradient(:n, 1) + gradient(:n, 4))
+          gradient(:n, 1) + gradient(:n, 4), strip%rows)
         return
       end if
       if (keep_gradient) p%velocity_gradient(:, first:last) = transpose(gradient(:n, :))
@@ -331,18 +419,23 @@ contains
           gradient(:n, 4) = gradient(:n, 4) + change(:n)
         end if
         call update_stress(p, this%materials(body%material), first, last, time_step, gradient, &
-          this%tally%internal_work)
-        if (this%finds_wave_speed) this%tally%wave_squared = max(this%tally%wave_squared, &
-          wave_speed_squared(p, this%materials(body%material), first, last))
+          tally%internal_work)
+        if (this%finds_wave_speed) tally%wave_squared = wave_speed_squared(p, &
+          this%materials(body%material), first, last)
       end if
       if (sweep%move_with > 0) then
         call move_points(n, time_step, sweep%move_with, value, p%mass(first), &
-          p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), this%tally)
+          p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), tally)
         if (size(p%density) > 0) call add_heavier(n, sweep%move_with, value, p%mass(first:last), &
-          p%vx(first:last), p%vy(first:last), this%tally)
+          p%vx(first:last), p%vy(first:last), tally)
         ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
         if (this%stretches_domains) call this%stretch_domains(body, first, last)
-        call this%find_weights(first, last, w)
+      end if
+      if (.not. (sweep%map_momentum .or. sweep%map_force)) return
+      if (sweep%move_with > 0) call this%find_weights(first, last, w)
+      call w%number_rows(n, g%x%last)
+      if (points%rows(1) < strip%rows(1) .or. points%rows(2) > strip%rows(2)) then
+        call w%keep_rows(n, strip%rows(1), strip%rows(2), strip%spare)
       end if
       if (this%averages_cells .and. sweep%map_force) then
         call this%average_block(sweep, first, last, w)
@@ -351,19 +444,19 @@ contains
       else if (sweep%map_momentum .and. sweep%map_force) then
         call map_momentum_and_force(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
           p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%sxy(first:last), &
-          g%x%last, g%y%last, g%total_store(g%total_start))
+          g%last_node, g%total_store(g%total_start))
       else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), g%x%last, &
-          g%y%last, g%total_store(g%total_start))
+        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
+          g%last_node, g%total_store(g%total_start))
       else if (sweep%map_force) then
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
-                       p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+                       p%sxy(first:last), g%last_node, g%total_store(g%total_start))
       end if
       if (sweep%map_momentum .and. this%carries_gradient) call map_gradient(n, w, &
         p%mass(first:last), p%x(first:last), p%y(first:last), p%velocity_gradient(:, first:last), &
-        g%x, g%y, g%total_store(g%total_start), this%tally%kinetic_energy)
+        g%x, g%y, g%last_node, g%total_store(g%total_start), tally%kinetic_energy)
       if (sweep%map_force .and. this%amplitude > 0.0_wp) call this%push_points(time_step, &
-        this%materials(body%material), first, last, w)
+        this%materials(body%material), first, last, w, tally%force_work)
     end associate
   end subroutine sweep_block
 
@@ -383,11 +476,11 @@ contains
       if (sweep%map_momentum .and. size(p%density) > 0) then
         call this%map_varied(sweep_t(map_momentum=.true.), first, last, w)
       else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), g%x%last, &
-          g%y%last, g%total_store(g%total_start))
+        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
+          g%last_node, g%total_store(g%total_start))
       end if
       call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change(:n), p%syy(first:last) &
-        + change(:n), p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+        + change(:n), p%sxy(first:last), g%last_node, g%total_store(g%total_start))
     end associate
   end subroutine average_block
 
@@ -408,21 +501,23 @@ contains
         do j = 1, 3
           heavy%sy(:n, j) = w%sy(:n, j)*(p%mass(first:last)/p%mass(first))
         end do
-        call map_momentum(n, heavy, p%mass(first), p%vx(first:last), p%vy(first:last), g%x%last, &
-          g%y%last, g%total_store(g%total_start))
+        call map_momentum(n, heavy, p%mass(first), p%vx(first:last), p%vy(first:last), &
+          g%last_node, g%total_store(g%total_start))
       end if
       if (sweep%map_force) call map_force(n, w, p%volume(first:last), p%sxx(first:last), &
-        p%syy(first:last), p%sxy(first:last), g%x%last, g%y%last, g%total_store(g%total_start))
+        p%syy(first:last), p%sxy(first:last), g%last_node, g%total_store(g%total_start))
     end associate
   end subroutine map_varied
 
   !> Adds the body force of the manufactured solution, which knows of one density, to the nodes.
-  subroutine push_points(this, time_step, material, first, last, w)
+  !> Adds its work in J/m to `work`.
+  subroutine push_points(this, time_step, material, first, last, w, work)
     class(solver_t), intent(inout) :: this
     real(wp), intent(in) :: time_step
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
     type(weights_t), intent(in) :: w
+    real(dp), intent(inout) :: work
     real(wp) :: bx(BLOCK), by(BLOCK)
     integer :: n
 
@@ -430,9 +525,9 @@ contains
     associate (p => this%particles, g => this%grid)
       call manufactured_force(n, material, this%amplitude, this%time, p%x_start(first:last), &
         p%y_start(first:last), bx, by)
-      call map_body_force(n, w, p%mass(first), bx, by, g%x%last, g%y%last, &
+      call map_body_force(n, w, p%mass(first), bx, by, g%last_node, &
         g%total_store(g%total_start))
-      this%force_work = this%force_work + time_step*p%mass(first)*sum(p%vx(first:last)*bx(:n) &
+      work = work + time_step*p%mass(first)*sum(p%vx(first:last)*bx(:n) &
         + p%vy(first:last)*by(:n))
     end associate
   end subroutine push_points

@@ -39,21 +39,21 @@ module sg_transfer
 contains
 
   !> Adds mass and momentum of `n` points to the nodes.
-  pure subroutine map_momentum(n, w, mass, vx, vy, nx, ny, total)
+  pure subroutine map_momentum(n, w, mass, vx, vy, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     !> Of one point, kg/m; [n], m/s.
     real(wp), intent(in) :: mass, vx(n), vy(n)
-    !> Last node in each direction.
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    !> Last node of `total`.
+    integer, intent(in) :: last
+    real(wp), intent(inout) :: total(8, 0:last)
     real(wp) :: brought(4, BLOCK), along_row(4), s
     integer :: p, i, j, k, node
 
     call pack_momentum(n, mass, vx, vy, brought)
     do p = 1, n
-      node = w%node(p) - 1
       do j = 1, 3
+        node = w%row(p, j) - 1
         s = w%sy(p, j)
         !$omp simd simdlen(4)
         do k = 1, 4
@@ -66,7 +66,6 @@ contains
             total(k, node + i) = total(k, node + i) + s*along_row(k)
           end do
         end do
-        node = node + nx + 1
       end do
     end do
   end subroutine map_momentum
@@ -74,13 +73,14 @@ contains
   !> Adds to the momentum of the nodes what the velocities about `n` points differ from those at
   !> them, L (x_i - x_p); no momentum in sum, since the weights reproduce linear functions. Adds
   !> the kinetic energy of these differences, sum m S |L (x_i - x_p)|^2/2, to `energy` (J/m).
-  pure subroutine map_gradient(n, w, mass, x, y, gradient, x_axis, y_axis, total, energy)
+  pure subroutine map_gradient(n, w, mass, x, y, gradient, x_axis, y_axis, last, total, energy)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     !> [n], kg/m; [n], m; [4, n], 1/s, in the order of gather_motion_and_gradient.
     real(wp), intent(in) :: mass(n), x(n), y(n), gradient(4, n)
     type(axis_t), intent(in) :: x_axis, y_axis
-    real(wp), intent(inout) :: total(8, 0:(x_axis%last + 1)*(y_axis%last + 1) - 1)
+    integer, intent(in) :: last
+    real(wp), intent(inout) :: total(8, 0:last)
     real(dp), intent(inout) :: energy
     real(wp) :: dx(BLOCK, 3), dy(BLOCK, 3), at_point(2), along_x(2), twice
     integer :: p, i, j, node
@@ -98,14 +98,13 @@ contains
     end do
     energy = energy + 0.5_wp*mass(1)*twice
     do p = 1, n
-      node = w%node(p) - 1
       do j = 1, 3
+        node = w%row(p, j) - 1
         at_point = w%sy(p, j)*mass(p)*dy(p, j)*gradient(3:4, p)
         along_x = w%sy(p, j)*mass(p)*gradient(1:2, p)
         do i = 1, 3
           total(2:3, node + i) = total(2:3, node + i) + w%sx(p, i)*(at_point + dx(p, i)*along_x)
         end do
-        node = node + x_axis%last + 1
       end do
     end do
   end subroutine map_gradient
@@ -129,25 +128,25 @@ contains
   end subroutine find_distances
 
   !> Adds the internal force of `n` points to the nodes.
-  pure subroutine map_force(n, w, volume, sxx, syy, sxy, nx, ny, total)
+  pure subroutine map_force(n, w, volume, sxx, syy, sxy, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     !> [n], m^2 and Pa.
     real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    integer, intent(in) :: last
+    real(wp), intent(inout) :: total(8, 0:last)
     real(wp) :: brought(4, BLOCK), along_row(4), along_column(4, 3), s, g
     integer :: p, i, j, k, node
 
     call pack_force(n, volume, sxx, syy, sxy, brought)
     do p = 1, n
-      node = w%node(p) - 1
       do i = 1, 3
         s = w%sx(p, i)
         g = w%gx(p, i)
         along_column(:, i) = [g, g, s, s]
       end do
       do j = 1, 3
+        node = w%row(p, j) - 1
         s = w%sy(p, j)
         g = w%gy(p, j)
         along_row = [s, s, g, g]
@@ -161,18 +160,17 @@ contains
             total(4 + k, node + i) = total(4 + k, node + i) + along_column(k, i)*along_row(k)
           end do
         end do
-        node = node + nx + 1
       end do
     end do
   end subroutine map_force
 
   !> map_momentum and map_force.
-  pure subroutine map_momentum_and_force(n, w, mass, vx, vy, volume, sxx, syy, sxy, nx, ny, total)
+  pure subroutine map_momentum_and_force(n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: mass, vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    integer, intent(in) :: last
+    real(wp), intent(inout) :: total(8, 0:last)
     real(wp) :: momentum(4, BLOCK), force(4, BLOCK), brought(8, BLOCK)
 
     if (IS_WIDE) then
@@ -180,25 +178,24 @@ contains
       call pack_force(n, volume, sxx, syy, sxy, force)
       brought(1:4, :n) = momentum(:, :n)
       brought(5:8, :n) = force(:, :n)
-      call map_wide(n, w, brought, nx, ny, total)
+      call map_wide(n, w, brought, last, total)
     else
-      call map_momentum(n, w, mass, vx, vy, nx, ny, total)
-      call map_force(n, w, volume, sxx, syy, sxy, nx, ny, total)
+      call map_momentum(n, w, mass, vx, vy, last, total)
+      call map_force(n, w, volume, sxx, syy, sxy, last, total)
     end if
   end subroutine map_momentum_and_force
 
   !> Adds what the points bring to all eight lanes of the nodes.
-  pure subroutine map_wide(n, w, brought, nx, ny, total)
+  pure subroutine map_wide(n, w, brought, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: brought(8, BLOCK)
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    integer, intent(in) :: last
+    real(wp), intent(inout) :: total(8, 0:last)
     real(wp) :: along_row(8), along_column(8, 3), s, g
     integer :: p, i, j, k, node
 
     do p = 1, n
-      node = w%node(p) - 1
       do i = 1, 3
         s = w%sx(p, i)
         g = w%gx(p, i)
@@ -208,6 +205,7 @@ contains
         end do
       end do
       do j = 1, 3
+        node = w%row(p, j) - 1
         s = w%sy(p, j)
         g = w%gy(p, j)
         !$omp simd simdlen(8)
@@ -220,27 +218,25 @@ contains
             total(k, node + i) = total(k, node + i) + along_column(k, i)*along_row(k)
           end do
         end do
-        node = node + nx + 1
       end do
     end do
   end subroutine map_wide
 
   !> f_i += S m_p b_p for forces per mass `bx`, `by` in m/s^2.
-  pure subroutine map_body_force(n, w, mass, bx, by, nx, ny, total)
+  pure subroutine map_body_force(n, w, mass, bx, by, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: mass, bx(BLOCK), by(BLOCK)
-    integer, intent(in) :: nx, ny
-    real(wp), intent(inout) :: total(8, 0:(nx + 1)*(ny + 1) - 1)
+    integer, intent(in) :: last
+    real(wp), intent(inout) :: total(8, 0:last)
     integer :: p, i, j, node
 
     do p = 1, n
-      node = w%node(p) - 1
       do j = 1, 3
+        node = w%row(p, j) - 1
         do i = 1, 3
           total(5:6, node + i) = total(5:6, node + i) + w%sx(p, i)*w%sy(p, j)*mass*[bx(p), by(p)]
         end do
-        node = node + nx + 1
       end do
     end do
   end subroutine map_body_force

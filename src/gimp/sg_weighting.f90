@@ -40,10 +40,14 @@ module sg_weighting
   type :: weights_t
     !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1).
     integer :: i(BLOCK), j(BLOCK), node(BLOCK)
+    !> Number of the first node in each of the three rows that the points are mapped to.
+    integer :: row(BLOCK, 3)
     !> Weights and slopes (1/m) along x and along y: point, node of the stencil.
     real(wp) :: sx(BLOCK, 3), sy(BLOCK, 3), gx(BLOCK, 3), gy(BLOCK, 3)
   contains
     procedure :: number_nodes
+    procedure :: number_rows
+    procedure :: keep_rows
   end type weights_t
 
   !> The nodes along one axis.
@@ -85,6 +89,36 @@ contains
       this%node(p) = this%i(p) + this%j(p)*(nx + 1)
     end do
   end subroutine number_nodes
+
+  !> Numbers the first nodes of all three rows, for mapping.
+  pure subroutine number_rows(this, n, nx)
+    class(weights_t), intent(inout) :: this
+    integer, intent(in) :: n, nx
+    integer :: p
+
+    !$omp simd
+    do p = 1, n
+      this%row(p, 1) = this%node(p)
+      this%row(p, 2) = this%node(p) + nx + 1
+      this%row(p, 3) = this%node(p) + 2*(nx + 1)
+    end do
+  end subroutine number_rows
+
+  !> Leads what `n` points bring to rows of nodes other than first_row to last_row to the node
+  !> `spare` and the two after it.
+  pure subroutine keep_rows(this, n, first_row, last_row, spare)
+    class(weights_t), intent(inout) :: this
+    integer, intent(in) :: n, first_row, last_row, spare
+    integer :: p, k
+
+    do k = 1, 3
+      !$omp simd
+      do p = 1, n
+        this%row(p, k) = merge(this%row(p, k), spare, this%j(p) + k - 1 >= first_row &
+          .and. this%j(p) + k - 1 <= last_row)
+      end do
+    end do
+  end subroutine keep_rows
 
   !> uGIMP; see the head of the module.
   pure subroutine gimp_axis_weights(n, x, width, axis, base, s, g)

@@ -49,6 +49,8 @@ module sg_driver
     character(len=:), allocatable :: field_method
     !> The fields themselves; size 0 or not allocated without any.
     type(field_record_t), allocatable :: fields(:)
+    !> Said once when the run starts; may be empty.
+    character(len=:), allocatable :: warning
     !> Throw away what the directory holds of earlier runs.
     logical :: overwrite = .false.
     !> Wall clock limit in s, counted from the call of `run_ensemble`; 0 = none.
@@ -248,6 +250,9 @@ contains
       to_text(director%record%ranks)//' ranks, into '//director%directory)
     if (director%record%field_method /= '') then
       call director%progress%say('random field: '//director%record%field_method)
+    end if
+    if (allocated(request%warning)) then
+      if (request%warning /= '') call director%progress%say('warning: '//request%warning)
     end if
     if (resumed > 0) call director%progress%say('resumed: '//to_text(done)// &
       ' members are there, '//to_text(director%plan%total() - done)//' are missing')
