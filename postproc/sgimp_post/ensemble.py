@@ -203,7 +203,11 @@ class Ensemble:
             case.select(case.id <= case.planned) if case.stop_rule_met else case
             for case in self.cases
         ]
-        return cases if self.is_complete else [case.prefix(self.asked) for case in cases]
+        if not self.is_complete:
+            return [case.prefix(self.asked) for case in cases]
+        # Of a range: what an earlier run of other members left unfinished stays out.
+        asked = self.asked
+        return cases if asked is None else [case.select(np.isin(case.id, asked)) for case in cases]
 
 
 def read_ensemble(directory: Path) -> Ensemble:

@@ -2,15 +2,13 @@
 module sg_estimate
   use sg_config, only: config_t
   use sg_errors, only: error_t
-  use sg_field_properties, only: points_of_materials
-  use sg_ground, only: prepare_fields
+  use sg_ground, only: ground_t, prepare_grounds
   use sg_kinds, only: i8, wp
   use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: COLUMN_COUNT, outcome_t, reset_outcome, SECONDS, STEPS
   use sg_plan, only: plan_t
-  use sg_random_fields, only: random_fields_t
-  use sg_scene, only: build_scene, scene_t
+  use sg_scene, only: scene_t
   use sg_simulate, only: simulate
   use sg_stop_rule, only: make_stop_rule, RULE_COUNT, stop_rule_t
   use sg_study, only: variant_t
@@ -37,19 +35,18 @@ contains
     type(plan_t), intent(in) :: plan
     character(len=:), allocatable, intent(out) :: text
     type(error_t), allocatable, intent(out) :: error
-    type(scene_t) :: scene
-    character(len=:), allocatable :: more
+    type(ground_t), allocatable :: grounds(:)
     type(stop_rule_t) :: rule
-    character(len=:), allocatable :: bound
+    character(len=:), allocatable :: bound, field, more
     real(wp) :: seconds(size(variants)), core_seconds, megabytes
     integer(i8) :: members
     integer :: k, v
 
+    call prepare_grounds(variants, grounds, error)
+    if (.not. allocated(error)) call describe_fields(grounds, field, error)
+    if (allocated(error)) return
     do v = 1, size(variants)
-      call build_scene(variants(v)%config, scene, error)
-      if (allocated(error)) return
-      call describe_variant(variants(v)%config, scene, more, seconds(v), error)
-      if (allocated(error)) return
+      call describe_variant(variants(v)%config, grounds(v)%scene, field, more, seconds(v))
       if (v == 1) then
         text = more
       else if (v > SHOWN) then
@@ -58,7 +55,7 @@ contains
       else
         text = text//line('another variant '//trim(adjustl(variants(v)%varied//merge( &
           ' (control variate)', '                  ', variants(v)%twin_of > 0)))//': '// &
-          to_text(scene%particles%count)//' points, one member about '// &
+          to_text(grounds(v)%scene%particles%count)//' points, one member about '// &
           text_of_duration(seconds(v)))
       end if
     end do
@@ -87,20 +84,17 @@ contains
   end subroutine estimate_text
 
   !> One variant in words, and the seconds that a member of it takes here and now.
-  subroutine describe_variant(config, scene, text, member_seconds, error)
+  subroutine describe_variant(config, scene, field, text, member_seconds)
     type(config_t), intent(in) :: config
     type(scene_t), intent(in) :: scene
+    !> What is said of the random fields.
+    character(len=*), intent(in) :: field
     character(len=:), allocatable, intent(out) :: text
     real(wp), intent(out) :: member_seconds
-    type(error_t), allocatable, intent(out) :: error
-    character(len=:), allocatable :: field
     real(wp) :: step_seconds, limit
     integer(i8) :: steps_needed
     integer :: cells_x, cells_y
 
-    member_seconds = 0.0_wp
-    call describe_field(config, scene, field, error)
-    if (allocated(error)) return
     cells_x = nint((config%grid%x_max - config%grid%x_min)/config%grid%cell_size)
     cells_y = nint((config%grid%y_max - config%grid%y_min)/config%grid%cell_size)
     limit = config%grid%cell_size/(scene%wave_speed + scene%speed)
@@ -155,22 +149,26 @@ contains
     with_break = new_line('a')//text
   end function line
 
-  subroutine describe_field(config, scene, description, error)
-    type(config_t), intent(in) :: config
-    type(scene_t), intent(in) :: scene
+  !> How the fields are made, for the first of the grounds that have fields of their own.
+  subroutine describe_fields(grounds, description, error)
+    type(ground_t), intent(in) :: grounds(:)
     character(len=:), allocatable, intent(out) :: description
     type(error_t), allocatable, intent(out) :: error
-    type(random_fields_t), allocatable :: fields(:)
     integer(i8) :: bytes
+    integer :: own, v
 
     description = 'none: the run is deterministic'
-    if (.not. config%has_random_field) return
-    call prepare_fields(config, points_of_materials(scene), .true., fields, error)
-    if (allocated(error)) return
-    call fields(size(fields))%estimate(bytes, description, error)
-    if (allocated(error) .or. size(fields) == 1) return
-    description = description//' (for each of '//to_text(size(fields))//' functions)'
-  end subroutine describe_field
+    if (grounds(1)%source == 0) return
+    own = count([(grounds(v)%source == v, v=1, size(grounds))])
+    associate (fields => grounds(grounds(1)%source)%fields)
+      call fields(size(fields))%estimate(bytes, description, error)
+      if (allocated(error)) return
+      if (size(fields) > 1) description = description//' (for each of '//to_text(size(fields))// &
+        ' functions)'
+    end associate
+    if (own > 1) description = description//' (and for '//to_text(own - 1)// &
+      ' other grounds of the study)'
+  end subroutine describe_fields
 
   !> Seconds of one step, from the first steps of the homogeneous member.
   function time_step_cost(config, scene) result(step_seconds)

@@ -43,7 +43,8 @@ contains
     end if
     associate (cases => model%plan%cases)
       chosen = pack([(i, i=1, size(cases))], (options%study_case == '' .or. &
-        cases%label == options%study_case) .and. .not. cases%is_homogeneous)
+        cases%label == options%study_case) .and. .not. cases%is_homogeneous .and. &
+        (cases%control_of == 0 .or. options%study_case /= ''))
     end associate
     if (size(chosen) == 0) call raise(error, EXIT_BAD_INPUT, 'no study case with random fields '// &
       'is called '//options%study_case, 'write_fields')

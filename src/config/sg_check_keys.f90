@@ -56,19 +56,25 @@ contains
     integer, intent(in) :: g, e
     type(fault_list_t), intent(inout) :: faults
     type(key_t) :: key
-    character(len=:), allocatable :: name, fault
-    integer :: row, occurrence, first
+    character(len=:), allocatable :: name, fault, ignored
+    integer :: row, occurrence, first, first_row, first_occurrence
 
     name = nml%groups(g)%entries(e)%key
     call find_study_key(nml, name, row, occurrence, fault)
-    first = nml%groups(g)%find(name)
+    ! The same key may have been listed under another name.
+    do first = 1, e
+      call find_study_key(nml, nml%groups(g)%entries(first)%key, first_row, first_occurrence, &
+        ignored)
+      if (first_row == row .and. first_occurrence == occurrence) exit
+    end do
     if (len(fault) > 0) then
       call faults%add(nml%groups(g)%entries(e)%line, '&study '//name, fault)
     else if (row == 0) then
       call report_unknown(nml%groups(g), e, faults)
     else if (first < e) then
       call faults%add(nml%groups(g)%entries(e)%line, '&study '//name, &
-        'given twice; the first one is in line '//to_text(nml%groups(g)%entries(first)%line))
+        'given twice; the first one, '//nml%groups(g)%entries(first)%key//', is in line '// &
+        to_text(nml%groups(g)%entries(first)%line))
     else
       key = KEYS(row)
       key%group = 'study'
@@ -194,6 +200,8 @@ contains
           trim(KEYS(row)%group)//'?'
       end do
     end if
+    if (len(hint) == 0 .and. group%name == 'study') hint = 'any key of one number or word may '// &
+      'be listed; sgimp --keys has them all'
     if (len(hint) == 0) hint = 'sgimp --keys '//group%name//' lists those there are'
     call faults%add(group%entries(e)%line, '&'//group%name//' '//key, &
       'there is no such key in this group ('//hint//')')

@@ -12,6 +12,9 @@ module sg_fault_list
   type :: fault_t
     integer :: line
     character(len=:), allocatable :: text
+    !> Behind the text: who has it, of several; and how many have.
+    character(len=:), allocatable :: note
+    integer :: bearers = 1
   end type fault_t
 
   type :: fault_list_t
@@ -20,7 +23,8 @@ module sg_fault_list
     type(fault_t), allocatable :: items(:)
   contains
     procedure :: add
-    procedure :: add_new
+    procedure :: add_of
+    procedure :: settle
     procedure :: text => text_of_faults
   end type fault_list_t
 
@@ -46,10 +50,12 @@ contains
     else
       this%items(this%number)%text = printable(what)
     end if
+    this%items(this%number)%note = ''
   end subroutine add
 
-  !> Adds those of `others` that are not there yet, each with `note` behind it.
-  subroutine add_new(this, others, note)
+  !> Adds the faults of one of several, whom `note` names; those that are there already are told
+  !> once, of the first who has them.
+  subroutine add_of(this, others, note)
     class(fault_list_t), intent(inout) :: this
     type(fault_list_t), intent(in) :: others
     character(len=*), intent(in) :: note
@@ -58,11 +64,26 @@ contains
     each: do i = 1, others%number
       do j = 1, this%number
         if (this%items(j)%line == others%items(i)%line .and. &
-          this%items(j)%text == others%items(i)%text) cycle each
+          this%items(j)%text == others%items(i)%text) then
+          this%items(j)%bearers = this%items(j)%bearers + 1
+          cycle each
+        end if
       end do
-      call this%add(others%items(i)%line, '', others%items(i)%text//note)
+      call this%add(others%items(i)%line, '', others%items(i)%text)
+      this%items(this%number)%note = note
     end do each
-  end subroutine add_new
+  end subroutine add_of
+
+  !> What all `number` of them have is told without a note.
+  subroutine settle(this, number)
+    class(fault_list_t), intent(inout) :: this
+    integer, intent(in) :: number
+    integer :: i
+
+    do i = 1, this%number
+      if (this%items(i)%bearers == number) this%items(i)%note = ''
+    end do
+  end subroutine settle
 
   !> Control characters, with which a file could do things to the terminal, become '?'.
   pure function printable(text) result(clean)
@@ -100,7 +121,7 @@ contains
     do i = 1, shown
       if (i > 1) text = text//new_line('a')
       text = text//file_name//':'//to_text(this%items(order(i))%line)//': '// &
-        this%items(order(i))%text
+        this%items(order(i))%text//this%items(order(i))%note
     end do
     if (this%number > shown) then
       text = text//new_line('a')//file_name//': and '//to_text(this%number - shown)// &

@@ -45,8 +45,8 @@ module sg_read_config
     procedure :: visit_study_lists
   end type reader_t
 
-  !> Labels get no longer than NAME_LENGTH.
-  integer, parameter :: LONGEST_SUFFIX = NAME_LENGTH - 24
+  !> Of labels of twice NAME_LENGTH, with acf, cov and `_control` before and behind.
+  integer, parameter :: LONGEST_SUFFIX = 2*NAME_LENGTH - 32
   !> More variants of a case are a mistake.
   integer(i8), parameter :: MOST_VARIANTS = 1000_i8
 
@@ -99,9 +99,10 @@ contains
         if (v > number) variant%twin_of = v - number
         more = fault_list_t()
         call take_variant(nml, lists, variant, file_name, more)
-        call faults%add_new(more, note_of(variant))
+        call faults%add_of(more, variant%note())
       end associate
     end do
+    call faults%settle(size(variants))
     if (faults%number > 0) call raise(error, EXIT_BAD_INPUT, faults%text(file_name), file_name)
   end subroutine read_variants
 
@@ -133,16 +134,6 @@ contains
         to_text(config%grid%cell_size)//' m (allowed: coarser cells)')
     end associate
   end subroutine take_variant
-
-  !> Said behind a fault: which variant has it.
-  pure function note_of(variant) result(note)
-    type(variant_t), intent(in) :: variant
-    character(len=:), allocatable :: note
-
-    note = ''
-    if (variant%varied /= '') note = ' [with '//variant%varied//']'
-    if (variant%twin_of > 0) note = ' [as control variate]'//note
-  end function note_of
 
   !> Text, keys that &study lists, and their values.
   subroutine scan_text(text, file_name, nml, lists, faults, error)
@@ -187,7 +178,7 @@ contains
     do v = 1, int(combination_count(lists))
       if (len(suffix_of_choice(lists, choice_of(lists, v))) <= LONGEST_SUFFIX) cycle
       call faults%add(nml%line_of('study', 1, ''), '&study', 'lists so many keys that the '// &
-        'labels of its cases get longer than '//to_text(NAME_LENGTH)//' characters')
+        'labels of its cases get longer than '//to_text(2*NAME_LENGTH)//' characters')
       return
     end do
   end subroutine check_lists

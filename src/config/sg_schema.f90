@@ -365,7 +365,8 @@ module sg_schema
     choices='random antithetic latin_hypercube importance', needs='random_field', &
     meaning='random: members are independent; antithetic: every second one mirrors the one '// &
     'before; latin_hypercube: stratified over all realizations; importance: weighted, by tilt'), &
-    key_t('monte_carlo', 'tilt', KIND_REAL, unit='1', example='-2.5', required=.true., &
+    key_t('monte_carlo', 'tilt', KIND_REAL, unit='1', range='[-8,8]', example='-2.5', &
+    required=.true., &
     when='sampling', when_is='importance', meaning='Importance sampling: shift of the spatial '// &
     'mean of the first Gaussian field, in its own standard deviations'), &
     key_t('monte_carlo', 'stop_rule', KIND_WORD, default='count', &

@@ -5,14 +5,15 @@ module sg_study
   use sg_kinds, only: i8, wp
   use sg_namelist, only: namelist_t, nml_value_t
   use sg_number_text, only: parse_integer, parse_real
-  use sg_schema, only: has_word, key_row, KEYS, KIND_INTEGER, KIND_REAL, KIND_WORD
+  use sg_schema, only: group_row, GROUPS, has_word, key_row, KEYS, KIND_INTEGER, KIND_REAL, &
+    KIND_WORD
   use sg_study_keys, only: find_study_key
   use sg_text, only: lower_case, to_text
   implicit none
   private
 
   public :: variant_t, listed_keys, combination_count, choice_of, apply_choice, override_key
-  public :: short_name, text_of_choice, suffix_of_choice
+  public :: text_of_choice, suffix_of_choice
 
   !> One of them: a case of its own in all but the random numbers.
   type :: variant_t
@@ -25,6 +26,8 @@ module sg_study
     character(len=:), allocatable :: suffix
     !> Position of the variant that this one is the twin of on coarser cells; 0: of none.
     integer :: twin_of = 0
+  contains
+    procedure :: note => note_of_variant
   end type variant_t
 
   !> Properties that a field takes from the material of the same name: a listed mean is that of
@@ -35,13 +38,14 @@ module sg_study
 contains
 
   !> The keys of other groups that &study lists and that have passed their checks, with their values
-  !> in their shortest form.
+  !> in their shortest form; in the order of the schema, whatever that of the file: results are kept
+  !> by the position of their case.
   subroutine listed_keys(nml, lists)
     type(namelist_t), intent(in) :: nml
     type(study_list_t), allocatable, intent(out) :: lists(:)
     type(study_list_t), allocatable :: found(:)
     character(len=:), allocatable :: fault
-    integer :: e, g, i, used
+    integer :: e, g, i, k, used
 
     allocate (lists(0))
     g = nml%locate('study', 1)
@@ -63,7 +67,20 @@ contains
       end do
     end associate
     lists = found(:used)
+    do k = 2, used
+      do i = k, 2, -1
+        if (.not. comes_before(lists(i), lists(i - 1))) exit
+        lists(i - 1:i) = lists([i, i - 1])
+      end do
+    end do
   end subroutine listed_keys
+
+  pure logical function comes_before(one, other)
+    type(study_list_t), intent(in) :: one, other
+
+    comes_before = one%row < other%row .or. (one%row == other%row .and. &
+      one%occurrence < other%occurrence)
+  end function comes_before
 
   pure function shortest(kind_of_key, text) result(short)
     integer, intent(in) :: kind_of_key
@@ -115,38 +132,45 @@ contains
     integer, intent(in) :: choice(:)
     type(namelist_t), intent(inout) :: nml
     type(nml_value_t) :: value
+    character(len=:), allocatable :: mean
     integer :: k
 
     do k = 1, size(lists)
-      associate (key => KEYS(lists(k)%row), group => nml%groups(nml%locate('study', 1)))
+      associate (group => nml%groups(nml%locate('study', 1)))
         value = group%entries(group%find(trim(lists(k)%name)))%values(choice(k))
         value%text = trim(lists(k)%values(choice(k)))
       end associate
-      associate (key => KEYS(lists(k)%row))
-        call override_key(nml, trim(key%group), lists(k)%occurrence, trim(key%name), value)
+      associate (key => KEYS(lists(k)%row), number => lists(k)%occurrence)
         if (key%group == 'random_field' .and. key%name == 'mean') then
-          call override_nominal(nml, lists(k)%occurrence, value)
+          mean = first_value(nml, 'random_field', number, 'mean')
+          if (mean == '') mean = trim(lists(k)%values(1))
+          call override_nominal(nml, number, mean, value)
         end if
+        call override_key(nml, trim(key%group), number, trim(key%name), value)
       end associate
     end do
   end subroutine apply_choice
 
-  !> The material has the mean of field `k` where it has had the mean of the field before: as
-  !> property of the homogeneous ground.
-  subroutine override_nominal(nml, k, value)
+  !> Where the material has had the `mean` of field `k`, as property of the homogeneous ground, it
+  !> has the new one, too. Not where the field is only for a part of the material.
+  subroutine override_nominal(nml, k, mean, value)
     type(namelist_t), intent(inout) :: nml
     integer, intent(in) :: k
+    character(len=*), intent(in) :: mean
     type(nml_value_t), intent(in) :: value
-    character(len=:), allocatable :: material, property
+    character(len=:), allocatable :: material, property, present_value
     integer :: m
 
+    if (first_value(nml, 'random_field', k, 'region') /= '') return
+    if (first_value(nml, 'random_field', k, 'body') /= '') return
     material = first_value(nml, 'random_field', k, 'material')
     property = lower_case(first_value(nml, 'random_field', k, 'property'))
     if (property == '') property = trim(KEYS(key_row('random_field', 'property'))%default)
     if (.not. has_word(NOMINAL, property)) return
     do m = 1, nml%count('material')
       if (first_value(nml, 'material', m, 'name') /= material) cycle
-      if (first_value(nml, 'material', m, property) == '') cycle
+      present_value = first_value(nml, 'material', m, property)
+      if (shortest(KIND_REAL, present_value) /= shortest(KIND_REAL, mean)) cycle
       call override_key(nml, 'material', m, property, value)
     end do
   end subroutine override_nominal
@@ -193,19 +217,29 @@ contains
     end associate
   end subroutine override_key
 
-  !> A list in labels: its key alone, with the group where another list has the same key.
+  !> Said behind what is wrong with a variant: which one it is; empty where there is only one.
+  pure function note_of_variant(this) result(note)
+    class(variant_t), intent(in) :: this
+    character(len=:), allocatable :: note
+
+    note = ''
+    if (this%varied /= '') note = ' [with '//this%varied//']'
+    if (this%twin_of > 0) note = ' [as control variate]'//note
+  end function note_of_variant
+
+  !> A list in labels: its key alone; with its group where that is not the first of its name, or
+  !> where another list has the same key: `body2.height`.
   pure function short_name(lists, k) result(name)
     type(study_list_t), intent(in) :: lists(:)
     integer, intent(in) :: k
     character(len=:), allocatable :: name
-    integer :: other
 
     associate (key => KEYS(lists(k)%row))
       name = trim(key%name)
-      do other = 1, size(lists)
-        if (other == k .or. KEYS(lists(other)%row)%name /= key%name) cycle
-        name = trim(key%group)//to_text(lists(k)%occurrence)//'.'//trim(key%name)
-      end do
+      if (lists(k)%occurrence == 1 .and. count(KEYS(lists%row)%name == key%name) == 1) return
+      name = trim(key%group)//'.'//name
+      if (GROUPS(group_row(trim(key%group)))%repeatable) name = trim(key%group)// &
+        to_text(lists(k)%occurrence)//'.'//trim(key%name)
     end associate
   end function short_name
 

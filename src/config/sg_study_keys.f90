@@ -42,6 +42,8 @@ contains
       return
     end if
     associate (owner => KEYS(rows(1))%group)
+      if (owner == 'random_field' .and. occurrence < 2 .and. (key == 'acf' .or. key == 'cov')) &
+        fault = 'of the first field this is &study '//key//' (write '//key//')'
       if (GROUPS(group_row(owner))%repeatable) then
         k = nml%count(trim(owner))
         if (k == 0) then
@@ -70,6 +72,7 @@ contains
     mark = index(name, '%')
     group = name(:max(0, mark - 1))
     key = trim(name(mark + 1:))
+    if (mark == 1) key = ''
     occurrence = 0
     bracket = index(group, '(')
     if (bracket == 0) return

@@ -20,6 +20,7 @@ module sg_random_fields
   use sg_random_field, only: field_points_t, random_field_t
   use sg_sampler, only: create_sampler, estimate_sampler_memory, gaussian_sampler_t
   use sg_text, only: to_text
+  use sg_tilt, only: tilt_t
   use sg_white_noise, only: noise_source_t, PLAN_ANTITHETIC, PLAN_LATIN_HYPERCUBE, PLAN_RANDOM
   implicit none
   private
@@ -49,24 +50,14 @@ module sg_random_fields
     real(wp), allocatable :: values(:, :)
   end type reach_t
 
-  !> Importance sampling: the white noise of the first Gaussian field z = A w is shifted along u =
-  !> A^T a/|A^T a|, a = 1/n for each of its points, by `shift` standard deviations of the mean of z:
-  !> the direction in which a^T z grows most (Au & Beck 1999, for a linear limit state). So z is
-  !> shifted by shift C a/s with s^2 = a^T C a, and a member weighs exp(-shift a^T z/s - shift^2/2),
-  !> z before the shift.
-  type :: tilt_t
-    real(wp) :: shift = 0.0_wp
-    !> C a/s at the points of the field, and s; allocated if there is a shift.
-    real(wp), allocatable :: direction(:)
-    real(wp) :: sd_of_mean = 1.0_wp
-  end type tilt_t
-
   type :: random_fields_t
     type(random_field_t), allocatable :: fields(:)
     !> Correlations between the Gaussian fields, and the lower Cholesky factor of their matrix.
     real(wp), allocatable :: between(:, :), mix(:, :)
     type(measurements_t) :: data
     type(noise_source_t) :: source
+    !> Importance sampling: shift of the first field, in standard deviations of its mean.
+    real(wp), private :: shift = 0.0_wp
     type(tilt_t), private :: tilt
     !> Sampler of each field, position in `samplers`; 0 for fields from a file.
     integer, allocatable :: sampler_of(:)
@@ -93,7 +84,6 @@ module sg_random_fields
     procedure, private :: same_sampler
     procedure, private :: choose_methods
     procedure, private :: sample_gaussian
-    procedure, private :: aim_tilt
     procedure, private :: finish
   end type random_fields_t
 
@@ -121,7 +111,7 @@ contains
     end associate
     this%source = noise_source_t(config%monte_carlo%seed, plan_of(config%monte_carlo%sampling), &
       int(config%monte_carlo%realizations, i8))
-    if (config%monte_carlo%sampling == 'importance') this%tilt%shift = config%monte_carlo%tilt
+    if (config%monte_carlo%sampling == 'importance') this%shift = config%monte_carlo%tilt
     this%between = 0.0_wp
     do k = 1, size(this%fields)
       this%between(k, k) = 1.0_wp
@@ -315,34 +305,12 @@ contains
       end do
     end if
     call move_alloc(slots, this%samplers)
-    call this%aim_tilt()
+    call this%tilt%aim(this%shift, this%fields(1)%correlation, this%fields(1)%x, this%fields(1)%y)
     call refuse_unequal_noise(this, error)
     if (allocated(error) .or. size(this%data%x) == 0) return
     call this%kriging%prepare(this%data, this%fields%correlation, this%between, error)
     if (.not. allocated(error)) call fill_reach(this, error)
   end subroutine build
-
-  !> The direction of the tilt. Takes the square of the number of points in evaluations of the
-  !> correlation.
-  subroutine aim_tilt(this)
-    class(random_fields_t), intent(inout) :: this
-    integer :: i, j
-
-    if (.not. abs(this%tilt%shift) > 0.0_wp) return
-    associate (field => this%fields(1), tilt => this%tilt)
-      allocate (tilt%direction(size(field%x)))
-      do i = 1, size(field%x)
-        tilt%direction(i) = 0.0_wp
-        do j = 1, size(field%x)
-          tilt%direction(i) = tilt%direction(i) + field%correlation%at(field%x(i) - field%x(j), &
-            field%y(i) - field%y(j))
-        end do
-      end do
-      tilt%direction = tilt%direction/size(field%x)
-      tilt%sd_of_mean = sqrt(sum(tilt%direction)/size(field%x))
-      tilt%direction = tilt%direction/tilt%sd_of_mean
-    end associate
-  end subroutine aim_tilt
 
   !> Tells a sampler the places of all data; where it moves them, those of its fields move.
   subroutine observe_fields(this, number, sampler)
@@ -537,13 +505,7 @@ contains
       end if
       if (allocated(error)) return
       do m = 1, number
-        if (k == 1 .and. allocated(this%tilt%direction)) then
-          associate (tilt => this%tilt)
-            results(k, m)%log_weight = -tilt%shift*sum(z(:, m))/size(z, 1)/tilt%sd_of_mean &
-              - 0.5_wp*tilt%shift**2
-            z(:, m) = z(:, m) + tilt%shift*tilt%direction
-          end associate
-        end if
+        if (k == 1) call this%tilt%apply(z(:, m), results(k, m)%log_weight)
         results(k, m)%values = z(:, m)
       end do
       deallocate (z)

@@ -75,7 +75,8 @@ contains
   end function is_over
 
   !> Members that all cases will have in the end, by what is known now: before the first look, by
-  !> the ids without a gap if there are ten.
+  !> the ids without a gap if there are ten. Of a run of some members only, which no rule ends
+  !> early, the plan knows.
   function forecast(this, results) result(number)
     class(case_watch_t), intent(in) :: this
     type(case_results_t), intent(in) :: results(:)

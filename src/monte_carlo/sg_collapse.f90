@@ -11,8 +11,8 @@ module sg_collapse
   use sg_monitor, only: monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: FAILURE_STEP, FIELD_CLIPPED, FIELD_MAX, FIELD_MEAN, FIELD_MIN, &
-    LOG_WEIGHT, outcome_t, reset_outcome, STATUS_ABANDONED, STATUS_FIELD_FAILED, STATUS_OK, &
-    STATUS_TIME_LIMIT, status_text, STEPS
+    LOG_WEIGHT, outcome_t, reset_outcome, SECONDS, STATUS_ABANDONED, STATUS_FIELD_FAILED, &
+    STATUS_OK, STATUS_TIME_LIMIT, status_text, STEPS
   use sg_philox, only: fill_uniform, NOISE_STREAM
   use sg_plan, only: plan_t
   use sg_posix, only: write_file
@@ -105,6 +105,7 @@ contains
     end if
     if (allocated(error)) then
       outcome%status = STATUS_FIELD_FAILED
+      outcome%values(SECONDS) = 0.0_wp
       outcome%reason = error%message
       return
     end if

@@ -11,7 +11,7 @@ module sg_director
   use sg_posix, only: caught_signal, file_exists
   use sg_progress, only: json_text, progress_t
   use sg_scheduler, only: CARRY_ON, director_t, FINISH_STARTED, STOP_NOW
-  use sg_statistics, only: contiguous_prefix, describe, sample_statistics_t
+  use sg_statistics, only: contiguous_prefix, describe, mean_interval, sample_statistics_t
   use sg_text, only: to_text
   use sg_timer, only: wall_seconds
   implicit none
@@ -174,13 +174,15 @@ contains
   !> A line of progress.
   subroutine report(this)
     class(ensemble_director_t), intent(inout) :: this
-    integer(i8) :: done, failed
+    integer(i8) :: done, expected, failed
 
     call this%sync_journal()
     call this%count_members(done, failed)
     this%last_report = wall_seconds()
-    call this%progress%report(done, this%plan%total(), this%watch%forecast(this%results), failed, &
-      this%fresh, this%last_report - this%start, this%running_text())
+    expected = this%plan%total()
+    if (.not. this%plan%is_part()) expected = this%watch%forecast(this%results)
+    call this%progress%report(done, this%plan%total(), expected, failed, this%fresh, &
+      this%last_report - this%start, this%running_text())
   end subroutine report
 
   !> Mean of the 99.5 % runout with its 95 % interval, in the study case that has come farthest,
@@ -205,7 +207,7 @@ contains
     s = this%statistics_of(best)
     if (s%count == 0) return
     text = ', runout_q995 of '//this%results(best)%label//' '//to_text(s%mean, 5)
-    if (s%count > 1) text = text//' +- '//to_text(s%half_width, 2)
+    if (s%half_width < huge(1.0_wp)) text = text//' +- '//to_text(s%half_width, 2)
     text = text//' m (95 %, n='//to_text(s%count)//')'
   end function running_text
 
@@ -219,19 +221,40 @@ contains
     end associate
   end function prefix_of
 
-  !> Of the 99.5 % runout of these members.
+  !> Of the 99.5 % runout of these members; nothing of weighted ones.
   pure function statistics_of(this, case_index) result(statistics)
     class(ensemble_director_t), intent(in) :: this
     integer, intent(in) :: case_index
     type(sample_statistics_t) :: statistics
     integer(i8) :: first, last
 
+    if (this%record%sampling == 'importance') return
     associate (r => this%results(case_index), range => this%plan%range_of(case_index))
       first = range(1)
       last = first + this%prefix_of(case_index) - 1
-      statistics = describe(r%values(RUNOUT_Q995, first:last), r%status(first:last) == STATUS_OK)
+      associate (values => r%values(RUNOUT_Q995, first:last), &
+        good => r%status(first:last) == STATUS_OK)
+        statistics = describe(values, good)
+        if (this%record%sampling == 'antithetic' .and. r%role /= 'homogeneous' .and. &
+          modulo(first, 2_i8) == 1) call take_pairs(values, good, statistics)
+      end associate
     end associate
   end function statistics_of
+
+  !> The interval of the mean by antithetic pairs, which are what is independent.
+  pure subroutine take_pairs(values, good, statistics)
+    real(wp), intent(in) :: values(:)
+    logical, intent(in) :: good(:)
+    type(sample_statistics_t), intent(inout) :: statistics
+    logical :: whole(size(values)/2)
+    real(wp) :: interval(2)
+
+    whole = good(:2*size(whole):2) .and. good(2::2)
+    interval = mean_interval(reshape(pack(values(:2*size(whole)), &
+      reshape(spread(whole, 1, 2), [2*size(whole)])), [2, count(whole)]))
+    statistics%half_width = huge(1.0_wp)
+    if (count(whole) > 1) statistics%half_width = 0.5_wp*(interval(2) - interval(1))
+  end subroutine take_pairs
 
   !> Puts on disk, at once, all members that came in since the last time. Nothing is told of a
   !> member, in a line of progress or in ensemble.h5, before.

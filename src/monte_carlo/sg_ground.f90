@@ -18,7 +18,7 @@ module sg_ground
   implicit none
   private
 
-  public :: ground_t, build_grounds, prepare_fields
+  public :: ground_t, build_grounds, prepare_grounds
 
   type :: ground_t
     type(config_t) :: config
@@ -54,29 +54,46 @@ contains
     type(error_t), allocatable, intent(out) :: error
     integer :: k, v
 
+    call prepare_grounds(variants, grounds, error)
+    if (allocated(error) .or. .not. variants(1)%config%has_random_field) return
+    do v = 1, size(variants)
+      if (grounds(v)%source /= v) cycle
+      do k = 1, size(grounds(v)%fields)
+        call grounds(v)%fields(k)%build(error)
+        if (.not. allocated(error)) cycle
+        error%message = error%message//variants(v)%note()
+        return
+      end do
+    end do
+    do v = 1, size(variants)
+      if (grounds(v)%source /= v) call set_restrictions(grounds(grounds(v)%source), grounds(v))
+    end do
+  end subroutine build_grounds
+
+  !> The same without factors of fields, and without what others than their sources need of them.
+  subroutine prepare_grounds(variants, grounds, error)
+    type(variant_t), intent(in) :: variants(:)
+    type(ground_t), allocatable, intent(out) :: grounds(:)
+    type(error_t), allocatable, intent(out) :: error
+    integer :: v
+
     allocate (grounds(size(variants)))
     do v = 1, size(variants)
       grounds(v)%config = variants(v)%config
       call build_scene(grounds(v)%config, grounds(v)%scene, error)
+      if (allocated(error)) error%message = error%message//variants(v)%note()
       if (allocated(error)) return
       grounds(v)%points = points_of_materials(grounds(v)%scene)
     end do
     if (.not. variants(1)%config%has_random_field) return
     do v = 1, size(variants)
       grounds(v)%source = source_of(variants, grounds, v)
-      associate (ground => grounds(v))
-        call prepare_fields(ground%config, ground%points, ground%source == v, ground%fields, error)
-        do k = 1, size(ground%config%study%acf)
-          if (allocated(error)) return
-          if (ground%source == v) call ground%fields(k)%build(error)
-        end do
-        if (allocated(error)) return
-      end associate
+      call prepare_fields(grounds(v)%config, grounds(v)%points, grounds(v)%source == v, &
+        grounds(v)%fields, error)
+      if (allocated(error)) error%message = error%message//variants(v)%note()
+      if (allocated(error)) return
     end do
-    do v = 1, size(variants)
-      if (grounds(v)%source /= v) call set_restrictions(grounds(grounds(v)%source), grounds(v))
-    end do
-  end subroutine build_grounds
+  end subroutine prepare_grounds
 
   !> The finest of the variants that have the fields of variant `v`, and of those the first.
   pure integer function source_of(variants, grounds, v) result(source)
@@ -159,7 +176,7 @@ contains
         if (.not. allocated(error)) call fields(k)%set_cov(config%study%cov(j), error)
       end do
       if (opens_files .and. .not. allocated(error)) call open_files(fields(k), &
-        config%monte_carlo%realizations, error)
+        max(config%monte_carlo%realizations, config%control_variate%realizations), error)
       if (allocated(error)) return
     end do
   end subroutine prepare_fields

@@ -41,9 +41,11 @@ contains
     outcome%values(SECONDS) = wall_seconds() - begin
   end subroutine take_functionals
 
+  !> The plain mean where all weights are 0 (points in one column or row).
   pure real(wp) function weighted_mean(values, weights)
     real(wp), intent(in) :: values(:), weights(:)
 
-    weighted_mean = sum(values*weights)/sum(weights)
+    weighted_mean = sum(values)/size(values)
+    if (sum(weights) > 0.0_wp) weighted_mean = sum(values*weights)/sum(weights)
   end function weighted_mean
 end module sg_linear_functional

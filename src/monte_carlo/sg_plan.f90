@@ -24,7 +24,7 @@ module sg_plan
     logical :: is_homogeneous = .false.
     !> Position of its variant; what that has beside acf and cov, as text.
     integer :: variant = 1
-    character(len=2*NAME_LENGTH) :: varied = ''
+    character(len=3*NAME_LENGTH) :: varied = ''
     !> Positions of the homogeneous case that is its noise floor, and of the case that it is the
     !> twin of on coarser cells; 0 for none.
     integer :: noise_case = 0, control_of = 0

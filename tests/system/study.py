@@ -47,17 +47,17 @@ def check_part(whole, label, part, other, what):
 # Damping and cell size; a field without one of its own is that of the finest cells.
 study = case("study", "&study damping=0.4, 0.7, cell_size=0.5, 0.25 /")
 listing = program.run("listed", 0, "--dry", case=study)
-check("snx_cov0.10_damping0.7_cell_size0.25: 6 members" in listing, f"--dry:\n{listing}")
+check("snx_cov0.10_cell_size0.25_damping0.7: 6 members" in listing, f"--dry:\n{listing}")
 check(not (program.root / "listed").exists(), "--dry wrote something")
 program.run("study", 3, case=study)
 plain = case("plain", "", ("damping=0.4", "damping=0.7"), ("cell_size=0.5", "cell_size=0.25"))
 program.run("plain", 2, case=plain)
-check_part("study", "snx_cov0.10_damping0.7_cell_size0.25", "plain", "base", "a case of the study")
-check_part("study", "deterministic_damping0.7_cell_size0.25", "plain", "deterministic", "homogeneous ground")
+check_part("study", "snx_cov0.10_cell_size0.25_damping0.7", "plain", "base", "a case of the study")
+check_part("study", "deterministic_cell_size0.25_damping0.7", "plain", "deterministic", "homogeneous ground")
 with h5py.File(program.root / "study" / "ensemble.h5") as file:
-    fine = file["cases/snx_cov0.10_damping0.4_cell_size0.25"]
-    coarse = file["cases/snx_cov0.10_damping0.4_cell_size0.5"]
-    check(fine.attrs["varied"].decode() == "damping=0.4, cell_size=0.25", "what varies is not told")
+    fine = file["cases/snx_cov0.10_cell_size0.25_damping0.4"]
+    coarse = file["cases/snx_cov0.10_cell_size0.5_damping0.4"]
+    check(fine.attrs["varied"].decode() == "cell_size=0.25, damping=0.4", "what varies is not told")
     shapes = fine["profile/height"].shape, coarse["profile/height"].shape
     check(shapes == ((MEMBERS, 80), (MEMBERS, 40)), f"profiles {shapes}")
     # The coarse points see means of four: the same mean of the field, up to what is set to its bounds.
@@ -66,6 +66,8 @@ with h5py.File(program.root / "study" / "ensemble.h5") as file:
 resolved = program.root / "study" / "resolved.nml"
 program.run("again", 1, case=resolved)
 check(columns(program.root / "study") == columns(program.root / "again"), "resolved.nml is another study")
+program.run("study", 2, case=case("turned", "&study cell_size=0.5, 0.25, damping=0.4, 0.7 /"))
+check(columns(program.root / "study") == columns(program.root / "again"), "the order of the keys is another study")
 failing = program.run("study", 1, case=case("other", "&study damping=0.4, 0.8, cell_size=0.5, 0.25 /"), expect=2)
 check("&study damping: 0.4, 0.7 -> 0.4, 0.8" in failing, f"the list that differs is not named:\n{failing}")
 
