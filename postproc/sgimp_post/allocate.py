@@ -7,10 +7,13 @@ import math
 import numpy as np
 
 from .analysis import analyse
-from .control_variates import allocate_for_cost, allocate_for_half_width
+from .control_variates import FEWEST, allocate_for_cost, allocate_for_half_width
 from .ensemble import RUNOUTS, read_ensemble
 from .errors import PostError
 from .statistics import CONFIDENCE, _z
+
+#: Of one case, as the program has it.
+MOST_MEMBERS = 1e9
 
 
 def run(options) -> int:
@@ -83,11 +86,19 @@ def _numbers(entry, options, cases: int):
     """(n, M, plain n) of one case; zeros where nothing is asked. Hours are shared equally."""
     r, w = entry["correlation"], entry["cost_ratio"]
     if options.half_width is not None:
-        plain = int(np.ceil((_z(CONFIDENCE) * entry["sd"] / options.half_width) ** 2))
+        root = _z(CONFIDENCE) * entry["sd"] / options.half_width
+        if not root <= MOST_MEMBERS**0.5:
+            raise PostError(f"--half-width asks for more than {MOST_MEMBERS:.0e} members of a case")
+        plain = int(np.ceil(root**2))
         return *allocate_for_half_width(entry["sd"], r, w, options.half_width), plain
     if options.hours is not None:
-        plain = int(3600.0 * options.hours / cases / entry["seconds"])
-        return *allocate_for_cost(r, w, plain), plain
+        plain = 3600.0 * options.hours / cases / entry["seconds"]
+        if not plain <= MOST_MEMBERS:
+            raise PostError(f"--hours pays for more than {MOST_MEMBERS:.0e} members of a case")
+        n, twins = allocate_for_cost(r, w, int(plain))
+        if n <= FEWEST:
+            raise PostError(f"--hours does not pay for {FEWEST + 1} members of each case")
+        return n, twins, int(plain)
     return 0, 0, 0
 
 

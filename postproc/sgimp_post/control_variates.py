@@ -261,5 +261,5 @@ def allocate_for_cost(correlation: float, cost_ratio: float, fine_members: float
 
 
 def _whole(n: float, ratio: float):
-    n = max(FEWEST + 1, int(np.ceil(n)))
-    return n, int(np.ceil(n * ratio))
+    fine = max(FEWEST + 1, int(np.ceil(n)))
+    return fine, max(fine, int(np.ceil(n * ratio)))

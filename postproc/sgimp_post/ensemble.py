@@ -35,6 +35,9 @@ STATUS_TEXTS = {
     8: "extreme strain",
 }
 
+#: Texts of the root: attributes, or datasets where they are too long for one (64 KiB).
+LONG_TEXTS = ("namelist", "resolved_namelist", "identity")
+
 INTEGER_COLUMNS = ("settled", "wall_touched", "steps", "failure_step", "failure_point")
 FLOAT_COLUMNS = (
     *RUNOUTS,
@@ -232,6 +235,9 @@ def read_ensemble(directory: Path) -> Ensemble:
 
 def _read_file(directory: Path, path: Path, file: h5py.File) -> Ensemble:
     attributes = {name: _plain(value) for name, value in file.attrs.items()}
+    for name in LONG_TEXTS:
+        if name in file:
+            attributes[name] = str(_plain(file[name][...].reshape(-1)[0]))
     if attributes.get("program") != "sgimp" or "cases" not in file:
         raise PostError(f"{path}: not a results file of sgimp (no program='sgimp' or no /cases)")
     geometry = Geometry()
