@@ -33,10 +33,10 @@ _LONG_NAMES = {
     "failure_point": "number of the point that failed",
 }
 
-#: Of a case as a whole: long name, units (of the mean: those of field_mean).
+#: Of a case as a whole: long name, units; those of the mean are of the property that varies.
 _CASE_NUMBERS = {
     "cov": ("coefficient of variation of the random field", "1"),
-    "mean": ("mean of the random field", None),
+    "mean": ("mean of the random field", ""),
     "scale_x": ("scale of fluctuation along x", "m"),
     "scale_y": ("scale of fluctuation along y", "m"),
 }
@@ -98,7 +98,7 @@ def _units(cases: list, name: str) -> str:
 def _write_cases(file: h5py.File, axes: list, cases: list) -> None:
     for name, (words, units) in _CASE_NUMBERS.items():
         values = np.array([getattr(case, name) for case in cases])
-        _variable(file, name, values, axes, words, units or _units(cases, "field_mean"))
+        _variable(file, name, values, axes, words, units)
     for name, words in _CASE_TEXTS.items():
         values = np.array([getattr(case, name) for case in cases], dtype=object)
         _variable(file, name, values, axes, words)

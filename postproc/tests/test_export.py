@@ -185,7 +185,7 @@ def test_members_and_cases_are_chosen(options, names, tmp_path, capsys):
 
 #: The second case has other members, other cells and a failure.
 CASES = [
-    {"label": "deterministic", "values": [5.0, 5.1]},
+    {"label": "deterministic", "values": [5.0, 5.1], "ids": [1, 3]},
     {
         "label": "base",
         "values": sample(3, 3),
@@ -216,7 +216,7 @@ def fixture_ensemble(tmp_path):
 def test_netcdf_has_dimensions_units_and_names(ensemble):
     """netCDF-4 is HDF5 whose variables are attached to dimension scales."""
     with h5py.File(ensemble) as file:
-        members, x = [1, 2, 5], np.union1d(0.25 + 0.5 * np.arange(40), CELLS)
+        members, x = [1, 2, 3, 5], np.union1d(0.25 + 0.5 * np.arange(40), CELLS)
         assert list(file["case"].asstr()) == ["deterministic", "base"]
         assert list(file["member"]) == members and list(file["x"]) == list(x)
         assert all(file[name].is_scale for name in ("case", "member", "x"))
@@ -226,29 +226,31 @@ def test_netcdf_has_dimensions_units_and_names(ensemble):
                 axes = [dimension[0].name for dimension in dataset.dims]
                 assert axes == ["/case", "/member", "/x"][: dataset.ndim], name
         runout, status = file["runout_max"][...], file["status"][...]
-        assert list(runout[0]) == pytest.approx([5.0, 5.1, np.nan], abs=0, nan_ok=True)
-        expected = [sample(3, 3)[0], np.nan, sample(3, 3)[2]]
+        expected = [5.0, np.nan, 5.1, np.nan]
+        assert list(runout[0]) == pytest.approx(expected, abs=0, nan_ok=True)
+        expected = [sample(3, 3)[0], np.nan, np.nan, sample(3, 3)[2]]
         assert list(runout[1]) == pytest.approx(expected, abs=0, nan_ok=True)
         assert file["runout_max"].attrs["units"] == "m"
-        assert status.tolist() == [[0, 0, -1], [0, 2, 0]]
+        assert status.tolist() == [[0, -1, 0, -1], [0, 2, -1, 0]]
         assert list(file["status"].attrs["flag_values"]) == list(STATUS_TEXTS)
         assert file["status"].attrs["flag_meanings"].split()[2] == "point_lost"
         assert file["steps"].attrs["_FillValue"] == -1 and file["steps"].dtype == np.int64
-        assert file["height_max"][1, 2] == 3.5
-        assert file["reason"].asstr()[1].tolist() == ["", "point left the grid", ""]
+        assert file["height_max"][1, 3] == 3.5
+        assert file["reason"].asstr()[1].tolist() == ["", "point left the grid", "", ""]
         assert file["acf"].asstr()[1] == "snx" and list(file["planned"]) == [2, 9]
         assert (file.attrs["seed"], file.attrs["state"]) == (2022, "running")
         height = file["height"][...]
-        np.testing.assert_array_equal(height[1][:, np.isin(x, CELLS)], np.arange(12).reshape(3, 4))
-        assert np.isnan(height[1][:, ~np.isin(x, CELLS)]).all() and np.isnan(height[0, 2]).all()
-        assert (height[0, :2][:, np.isin(x, 0.25 + 0.5 * np.arange(40))] == 1).all()
+        got = height[1, [0, 1, 3]][:, np.isin(x, CELLS)]
+        np.testing.assert_array_equal(got, np.arange(12).reshape(3, 4))
+        assert np.isnan(height[1][:, ~np.isin(x, CELLS)]).all() and np.isnan(height[0, 3]).all()
+        assert (height[0, [0, 2]][:, np.isin(x, 0.25 + 0.5 * np.arange(40))] == 1).all()
 
 
 def test_xarray_selects_by_case_and_member(ensemble):
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
     with xarray.open_dataset(ensemble, engine="h5netcdf") as data:
-        assert dict(data.sizes) == {"case": 2, "member": 3, "x": 44}
+        assert dict(data.sizes) == {"case": 2, "member": 4, "x": 44}
         assert float(data.runout_max.sel(case="base", member=5)) == sample(3, 3)[2]
         assert np.isnan(data.steps.sel(case="deterministic", member=5))
         assert data.runout_max.attrs["units"] == "m"
