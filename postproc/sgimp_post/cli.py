@@ -20,6 +20,7 @@ def main(arguments=None) -> int:
     _add_fields(commands)
     _add_allocate(commands)
     _add_merge(commands)
+    _add_export(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
@@ -126,5 +127,46 @@ def _add_merge(commands):
 
 def _merge(options) -> int:
     from .merge import run
+
+    return run(options)
+
+
+def _add_export(commands):
+    export = commands.add_parser(
+        "export", help="snapshots for ParaView or as CSV, the ensemble as netCDF for xarray"
+    )
+    export.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    form = export.add_mutually_exclusive_group(required=True)
+    form.add_argument(
+        "--vtkhdf",
+        dest="form",
+        action="store_const",
+        const="vtkhdf",
+        help="snapshots, a file a member (ParaView 5.12, pyvista)",
+    )
+    form.add_argument(
+        "--csv", dest="form", action="store_const", const="csv", help="snapshots, a file a step"
+    )
+    form.add_argument(
+        "--netcdf",
+        dest="form",
+        action="store_const",
+        const="netcdf",
+        help="ensemble.h5 as ensemble.nc with the dimensions case, member and x",
+    )
+    export.add_argument("--members", metavar="IDS", help="these alone, as 1-20,417")
+    export.add_argument("--study-case", metavar="LABEL", help="this one alone")
+    export.add_argument(
+        "--step", metavar="N", help="'first', 'last' or the number of one step (default all)"
+    )
+    export.add_argument(
+        "--out", type=Path, metavar="DIR2", help="where the files go (default DIR/export)"
+    )
+    export.add_argument("--overwrite", action="store_true", help="replace files that are there")
+    export.set_defaults(run=_export)
+
+
+def _export(options) -> int:
+    from .export import run
 
     return run(options)

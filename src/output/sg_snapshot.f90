@@ -169,8 +169,8 @@ contains
            grids//'</Grid></Domain></Xdmf>'//new_line('a')
   end function xdmf_text
 
-  !> The points of one time as an XDMF grid of vertices. Two components are no vector for ParaView,
-  !> which has them as arrays of two numbers all the same.
+  !> The points of one time as an XDMF grid of vertices. Arrays of several numbers a point are
+  !> called vectors, whatever their number: of a matrix ParaView's XDMF reader makes a single row.
   pure function grid_text(file, group, state) result(text)
     character(len=*), intent(in) :: file, group
     type(point_state_t), intent(in) :: state
@@ -204,7 +204,7 @@ contains
       character(len=:), allocatable :: form
 
       form = 'Scalar'
-      if (index(dimensions, ' ') > 0) form = 'Matrix'
+      if (index(dimensions, ' ') > 0) form = 'Vector'
       part = '<Attribute Name="'//name//'" AttributeType="'//form//'" Center="Node">'// &
              item(name, dimensions, kind)//'</Attribute>'//new_line('a')
     end function attribute
