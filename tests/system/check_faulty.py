@@ -5,7 +5,8 @@
 
 with exit code 2, each message once (only one rank speaks), and nothing written. `line` counts in the file itself,
 or in the file of that name beside it (of data; it has the stem of the case).
-Also: what --keys and --defaults print, and files that hold nothing or cannot be read."""
+Also: what --keys and --defaults print, files that hold nothing or cannot be read, and all cases of input/, which are
+good."""
 
 import argparse
 import json
@@ -17,6 +18,7 @@ import subprocess
 import tempfile
 
 FAULTY = pathlib.Path(__file__).parent / "faulty"
+INPUT = pathlib.Path(__file__).parents[2] / "input"
 EXPECT = re.compile(rb"! expect(?: in (\S+))?: (\d+): (.*)\n")
 RANKS = 3
 # Every so many files one runs under mpirun, which takes far longer.
@@ -144,6 +146,15 @@ def check_member(runner):
             check(code == expected and said in text + errors, f"{options}: exit code {code}\n{text}{errors}")
 
 
+def check_inputs(runner):
+    """Every case that comes with the program is accepted, and its members are listed."""
+    paths = sorted(INPUT.rglob("*.nml"))
+    check(len(paths) > 20, f"only {len(paths)} cases in {INPUT}")
+    for path in paths:
+        code, text, errors = runner.run(str(path), "--dry")
+        check(code == 0 and "members in" in text, f"{path}: exit code {code}\n{errors}")
+
+
 def main():
     """All of it."""
     parser = argparse.ArgumentParser()
@@ -154,6 +165,7 @@ def main():
     check_no_case(runner)
     check_listings(runner)
     check_member(runner)
+    check_inputs(runner)
 
 
 main()
