@@ -20,12 +20,22 @@ def main(arguments=None) -> int:
     _add_fields(commands)
     _add_allocate(commands)
     _add_merge(commands)
+    _add_fit(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
     except PostError as error:
         print(f"sgimp-post: {error}", file=sys.stderr)
         return 2
+
+
+def _add_runout(parser, purpose: str):
+    parser.add_argument(
+        "--runout",
+        choices=list(RUNOUTS),
+        default="runout_max",
+        help=f"definition {purpose} (default runout_max, as the paper)",
+    )
 
 
 def _add_report(commands):
@@ -36,12 +46,7 @@ def _add_report(commands):
     report.add_argument(
         "--output", type=Path, help="the HTML file (default DIR/report/report.html)"
     )
-    report.add_argument(
-        "--runout",
-        choices=list(RUNOUTS),
-        default="runout_max",
-        help="definition that figures and fits use (default runout_max, as the paper)",
-    )
+    _add_runout(report, "that figures and fits use")
     report.set_defaults(run=_report)
 
 
@@ -103,9 +108,7 @@ def _add_allocate(commands):
         "--half-width", type=float, metavar="M", help="of the 95 %% interval of the mean, in m"
     )
     target.add_argument("--hours", type=float, metavar="H", help="core-hours of all cases together")
-    allocate.add_argument(
-        "--runout", choices=list(RUNOUTS), default="runout_max", help="definition (runout_max)"
-    )
+    _add_runout(allocate, "whose mean is meant")
     allocate.set_defaults(run=_allocate)
 
 
@@ -126,5 +129,24 @@ def _add_merge(commands):
 
 def _merge(options) -> int:
     from .merge import run
+
+    return run(options)
+
+
+def _add_fit(commands):
+    fit = commands.add_parser(
+        "fit", help="the law of the runout, how sure it is, and its quantiles with intervals"
+    )
+    fit.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    _add_runout(fit, "that is fitted")
+    fit.add_argument("--case", metavar="LABEL", help="one case (default all with random fields)")
+    fit.add_argument(
+        "--bootstrap", type=int, default=1000, metavar="N", help="samples (default 1000)"
+    )
+    fit.set_defaults(run=_fit)
+
+
+def _fit(options) -> int:
+    from .fit_report import run
 
     return run(options)

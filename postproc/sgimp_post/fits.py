@@ -34,6 +34,9 @@ LAWS = {
     "weibull": "Weibull (min)",
 }
 
+#: The law on the line of each.
+FAMILIES = {"normal": "normal", "lognormal": "normal", "gumbel": "gumbel", "weibull": "gumbel"}
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -154,7 +157,7 @@ def from_line(law: str, y):
 
 
 def _is_normal(law: str) -> bool:
-    return law in ("normal", "lognormal")
+    return FAMILIES[law] == "normal"
 
 
 def _fit(law: str, x: np.ndarray) -> Fit:
