@@ -21,6 +21,7 @@ def main(arguments=None) -> int:
     _add_allocate(commands)
     _add_merge(commands)
     _add_fit(commands)
+    _add_diff(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
@@ -148,5 +149,20 @@ def _add_fit(commands):
 
 def _fit(options) -> int:
     from .fit_report import run
+
+    return run(options)
+
+
+def _add_diff(commands):
+    diff = commands.add_parser(
+        "diff", help="in which keys two runs differ, and whether their runouts do"
+    )
+    diff.add_argument("first", type=Path, metavar="A", help="output directory of a run")
+    diff.add_argument("second", type=Path, metavar="B", help="of another one")
+    diff.set_defaults(run=_diff)
+
+
+def _diff(options) -> int:
+    from .diff import run
 
     return run(options)

@@ -20,13 +20,11 @@ from .fits import (
     place_on_line,
     standardised,
 )
-from .statistics import CONFIDENCE, finite
+from .statistics import CONFIDENCE, blocks, finite
 
 PROBABILITIES = (0.95, 0.99, 0.999)
 #: Fewest values for a bootstrap.
 FEWEST_FOR_BOOTSTRAP = 8
-#: Numbers held at once.
-_BLOCK = 2_000_000
 _TAILS = (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE)
 
 
@@ -128,7 +126,7 @@ def choose_law(values, samples: int, rng, probabilities=PROBABILITIES) -> LawCho
 
 def _simulate(law: str, n: int, samples: int, rng) -> _Simulated:
     found = []
-    for size in _blocks(samples, n):
+    for size in blocks(samples, n):
         y = draw_on_line(law, rng, (size, n))
         location, scale = estimate_on_line(law, y)
         found.append((location, scale, anderson_darling(law, y, location, scale)))
@@ -139,7 +137,7 @@ def _choose_again(x, laws, samples: int, rng, probabilities):
     """Of resamples of `x`: number of the best of `laws` [samples], and its quantiles [samples, p].
     A resample of equal values alone, which has no law, is drawn again."""
     winners, quantiles = [], []
-    for size in _blocks(samples, len(x)):
+    for size in blocks(samples, len(x)):
         drawn = x[rng.integers(0, len(x), (size, len(x)))]
         while np.any(equal := np.ptp(drawn, axis=-1) == 0.0):
             drawn[equal] = x[rng.integers(0, len(x), (np.count_nonzero(equal), len(x)))]
@@ -154,10 +152,3 @@ def _choose_again(x, laws, samples: int, rng, probabilities):
         winners.append(best)
         quantiles.append(np.stack(found)[best, np.arange(size)])
     return np.concatenate(winners), np.concatenate(quantiles)
-
-
-def _blocks(samples: int, n: int):
-    """Numbers of samples that add up to `samples`."""
-    most = max(1, _BLOCK // n)
-    for first in range(0, samples, most):
-        yield min(most, samples - first)
