@@ -22,6 +22,7 @@ def main(arguments=None) -> int:
     _add_merge(commands)
     _add_fit(commands)
     _add_diff(commands)
+    _add_watch(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
@@ -164,5 +165,22 @@ def _add_diff(commands):
 
 def _diff(options) -> int:
     from .diff import run
+
+    return run(options)
+
+
+def _add_watch(commands):
+    watch = commands.add_parser("watch", help="how far a sweep has come, until it ends")
+    watch.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    _add_runout(watch, "that is shown")
+    watch.add_argument(
+        "--interval", type=float, default=5.0, metavar="S", help="seconds between looks (default 5)"
+    )
+    watch.add_argument("--once", action="store_true", help="one look")
+    watch.set_defaults(run=_watch)
+
+
+def _watch(options) -> int:
+    from .watch import run
 
     return run(options)
