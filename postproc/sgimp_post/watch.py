@@ -194,7 +194,8 @@ def duration(seconds: float) -> str:
 def _table(ensemble: Ensemble, runout: str):
     """`n` members are behind mean and sd: those without a gap from the first on, without failed
     ones."""
-    yield f"{runout} ({RUNOUTS[runout]}), mean with 95 % interval, m"
+    written = sum(case.count for case in ensemble.cases)
+    yield f"{runout} ({RUNOUTS[runout]}), mean with 95 % interval, m; {written} members written"
     width = max([len(case.label) for case in ensemble.cases] + [4])
     yield f"{'case':<{width}} {'done':>13} {'failed':>6} {'n':>6}   {'mean':<18} {'sd':<8}".rstrip()
     for case, used in zip(ensemble.cases, ensemble.for_statistics()):

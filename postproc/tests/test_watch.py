@@ -63,6 +63,7 @@ def test_a_running_sweep_in_numbers(tmp_path):
     half = 2.1009220 * x.std(ddof=1) / np.sqrt(19)  # Student's t, 18 degrees, 97.5 %
     expected = ["snx", "22/40", "1", "19", f"{x.mean():.4f}", "+-", f"{half:.4f}"]
     assert row(text, "snx") == [*expected, f"{x.std(ddof=1):.4f}"]
+    assert "runout_max (farthest point), mean with 95 % interval, m; 30 members written" in text
     assert row(text, "deterministic")[1:4] == ["8/8", "0", "8"]
 
 
@@ -103,6 +104,7 @@ def test_a_killed_run_falls_silent(tmp_path):
     write_events(tmp_path, start(), progress(12))
     write_results(tmp_path, 4)
     assert "no event" not in shown(tmp_path, NOON.replace(minute=2))[1]
+    assert "no event for 2 min 01 s" in shown(tmp_path, NOON.replace(minute=2, second=1))[1]
     text = shown(tmp_path, NOON.replace(hour=14, minute=3))[1]
     assert "no event for 2 h 03 min: members are slow, or the run was killed" in text
     write_events(tmp_path, start(), progress(12), end())
