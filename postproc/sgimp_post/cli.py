@@ -20,6 +20,9 @@ def main(arguments=None) -> int:
     _add_fields(commands)
     _add_allocate(commands)
     _add_merge(commands)
+    _add_fit(commands)
+    _add_diff(commands)
+    _add_watch(commands)
     _add_export(commands)
     options = parser.parse_args(arguments)
     try:
@@ -27,6 +30,15 @@ def main(arguments=None) -> int:
     except PostError as error:
         print(f"sgimp-post: {error}", file=sys.stderr)
         return 2
+
+
+def _add_runout(parser, purpose: str):
+    parser.add_argument(
+        "--runout",
+        choices=list(RUNOUTS),
+        default="runout_max",
+        help=f"definition {purpose} (default runout_max, as the paper)",
+    )
 
 
 def _add_report(commands):
@@ -37,12 +49,7 @@ def _add_report(commands):
     report.add_argument(
         "--output", type=Path, help="the HTML file (default DIR/report/report.html)"
     )
-    report.add_argument(
-        "--runout",
-        choices=list(RUNOUTS),
-        default="runout_max",
-        help="definition that figures and fits use (default runout_max, as the paper)",
-    )
+    _add_runout(report, "that figures and fits use")
     report.set_defaults(run=_report)
 
 
@@ -104,9 +111,7 @@ def _add_allocate(commands):
         "--half-width", type=float, metavar="M", help="of the 95 %% interval of the mean, in m"
     )
     target.add_argument("--hours", type=float, metavar="H", help="core-hours of all cases together")
-    allocate.add_argument(
-        "--runout", choices=list(RUNOUTS), default="runout_max", help="definition (runout_max)"
-    )
+    _add_runout(allocate, "whose mean is meant")
     allocate.set_defaults(run=_allocate)
 
 
@@ -127,6 +132,57 @@ def _add_merge(commands):
 
 def _merge(options) -> int:
     from .merge import run
+
+    return run(options)
+
+
+def _add_fit(commands):
+    fit = commands.add_parser(
+        "fit", help="the law of the runout, how sure it is, and its quantiles with intervals"
+    )
+    fit.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    _add_runout(fit, "that is fitted")
+    fit.add_argument("--case", metavar="LABEL", help="one case (default all with random fields)")
+    fit.add_argument(
+        "--bootstrap", type=int, default=1000, metavar="N", help="samples (default 1000)"
+    )
+    fit.set_defaults(run=_fit)
+
+
+def _fit(options) -> int:
+    from .fit_report import run
+
+    return run(options)
+
+
+def _add_diff(commands):
+    diff = commands.add_parser(
+        "diff", help="in which keys two runs differ, and whether their runouts do"
+    )
+    diff.add_argument("first", type=Path, metavar="A", help="output directory of a run")
+    diff.add_argument("second", type=Path, metavar="B", help="of another one")
+    diff.set_defaults(run=_diff)
+
+
+def _diff(options) -> int:
+    from .diff import run
+
+    return run(options)
+
+
+def _add_watch(commands):
+    watch = commands.add_parser("watch", help="how far a sweep has come, until it ends")
+    watch.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    _add_runout(watch, "that is shown")
+    watch.add_argument(
+        "--interval", type=float, default=5.0, metavar="S", help="seconds between looks (default 5)"
+    )
+    watch.add_argument("--once", action="store_true", help="one look")
+    watch.set_defaults(run=_watch)
+
+
+def _watch(options) -> int:
+    from .watch import run
 
     return run(options)
 

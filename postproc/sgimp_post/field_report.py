@@ -18,8 +18,8 @@ from . import field_figures
 from .errors import PostError
 from .field_audit import audit
 from .random_fields import read_random_fields
-from .report import _finite
 from .snapshots import find_snapshots
+from .tables import null_for_nan
 
 #: Members of an audit if none are named: enough to see an error of the standard deviation of 1 %
 #: in the baseline case, in seconds.
@@ -60,7 +60,7 @@ def write_audit(fields, options) -> int:
     checks = [{**asdict(check), "inside": check.inside} for check in numbers["checks"]]
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        content = _finite({**numbers, "checks": checks})
+        content = null_for_nan({**numbers, "checks": checks})
         (directory / "audit.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
         with open(directory / "audit.csv", "w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, list(checks[0]) if checks else ["case"])

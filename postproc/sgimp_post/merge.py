@@ -18,9 +18,10 @@ from .errors import PostError
 from .id_ranges import format_ids
 from .journal import FILE_NAME as JOURNAL_NAME
 from .journal import Journal, read_journal, write_journal
+from .namelist import differing_keys, identity_by_key
 
 #: Where members of the same configuration may still differ: told, not refused.
-_PROGRAM = ("version", "git_hash", "git_dirty", "compiler", "compiler_flags", "libraries")
+PROGRAM = ("version", "git_hash", "git_dirty", "compiler", "compiler_flags", "libraries")
 #: Differing keys that are named.
 _MOST_KEYS = 20
 #: The dataset of a case that is not a column of its members.
@@ -86,12 +87,8 @@ def _read_part(directory: Path) -> Part:
 
 def _check_same(first: Part, other: Part) -> None:
     """PostError with the keys by which the results of two parts differ."""
-    one, two = (_identity(part.attributes["identity"]) for part in (first, other))
-    found = [
-        f"{key}: {one.get(key, '(not set)')} -> {two.get(key, '(not set)')}"
-        for key in dict.fromkeys([*one, *two])
-        if one.get(key) != two.get(key)
-    ]
+    one, two = (identity_by_key(part.attributes["identity"]) for part in (first, other))
+    found = [f"{key}: {old} -> {new}" for key, old, new in differing_keys(one, two)]
     sizes = [part.attributes.get("realizations") for part in (first, other)]
     if first.attributes.get("sampling") == "latin_hypercube" and sizes[0] != sizes[1]:
         found.append(
@@ -138,16 +135,6 @@ def _check_datasets(first: Part, other: Part) -> None:
                     )
 
 
-def _identity(text: str) -> dict:
-    """Value by key; groups that occur several times by their number among the same lines."""
-    found, seen = {}, {}
-    for line in filter(None, (line.strip() for line in text.splitlines())):
-        key, _, value = line.partition(" = ")
-        seen[key] = seen.get(key, 0) + 1
-        found[key if seen[key] == 1 else f"{key} ({seen[key]})"] = value
-    return found
-
-
 def _check_disjoint(parts: list) -> None:
     found = []
     for one, two in combinations(parts, 2):
@@ -163,7 +150,7 @@ def _check_disjoint(parts: list) -> None:
 
 
 def _warnings(parts: list):
-    for name in _PROGRAM:
+    for name in PROGRAM:
         values = [str(part.attributes.get(name, "")) for part in parts]
         for part, value in zip(parts[1:], values[1:]):
             if value != values[0]:

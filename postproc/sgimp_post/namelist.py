@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 
+from .ensemble import FILE_NAME
 from .errors import PostError
 
 _TOKEN = re.compile(
@@ -12,6 +13,50 @@ _TOKEN = re.compile(
     r"""|(?P<mark>[&/=,])|(?P<word>[^\s&/=,'"!]+))"""
 )
 _LOGICALS = {".true.": True, "t": True, ".false.": False, "f": False}
+
+
+def resolved_text(ensemble):
+    """The resolved namelist of a run, of DIR/resolved.nml or else of the results file, and where it
+    stands. PostError if the file cannot be read."""
+    path = ensemble.directory / "resolved.nml"
+    try:
+        return path.read_text(encoding="utf-8"), str(path)
+    except FileNotFoundError:
+        text = ensemble.attributes.get("resolved_namelist", "")
+        return str(text), f"{ensemble.directory / FILE_NAME}: resolved_namelist"
+    except (OSError, UnicodeDecodeError) as cause:
+        raise PostError(f"{path}: cannot be read ({cause})") from cause
+
+
+def by_key(groups: list) -> dict:
+    """Values by `group(k)%key`, k counting the groups of a name: as the program names keys in the
+    text of what its results depend on."""
+    found, seen = {}, {}
+    for group, keys in groups:
+        seen[group] = seen.get(group, 0) + 1
+        found.update({f"{group}({seen[group]})%{key}": value for key, value in keys.items()})
+    return found
+
+
+def identity_by_key(text: str) -> dict:
+    """The same of that text, values as they stand there. Equal keys of texts of earlier versions by
+    their number among the same lines."""
+    found, seen = {}, {}
+    for line in filter(None, (line.strip() for line in text.splitlines())):
+        key, _, value = line.partition(" = ")
+        seen[key] = seen.get(key, 0) + 1
+        found[key if seen[key] == 1 else f"{key} ({seen[key]})"] = value
+    return found
+
+
+def differing_keys(first: dict, second: dict) -> list:
+    """(key, value in the first, in the second) where they differ; `(not set)` for what is not
+    there."""
+    nothing = "(not set)"
+    pairs = (
+        (key, first.get(key, nothing), second.get(key, nothing)) for key in {**first, **second}
+    )
+    return [(key, one, two) for key, one, two in pairs if one != two]
 
 
 def read_namelist(text: str, name: str = "resolved.nml") -> list:

@@ -16,7 +16,7 @@ from .conditioning import OPEN_VARIANCE, Data, pivoted_factor, weights_of_data
 from .ensemble import FILE_NAME, _plain, read_ensemble
 from .errors import PostError
 from .marginals import Marginal
-from .namelist import read_namelist
+from .namelist import read_namelist, resolved_text
 from .samplers import Points, create_sampler
 from .sampling_plan import DATA_STREAM, PLANS, field_stream, normal
 
@@ -358,7 +358,7 @@ def read_random_fields(directory: Path) -> RandomFields | None:
     """The fields of the run in DIR; None if it is deterministic."""
     directory = Path(directory)
     ensemble = read_ensemble(directory)
-    groups = read_namelist(*_resolved(directory, ensemble))
+    groups = read_namelist(*resolved_text(ensemble))
     keys = [keys for name, keys in groups if name == "random_field"]
     if not keys:
         return None
@@ -390,17 +390,6 @@ def read_random_fields(directory: Path) -> RandomFields | None:
         str(solver.get("precision", "double")).lower(),
         _cross_correlation(specs, [keys for name, keys in groups if name == "cross_correlation"]),
     )
-
-
-def _resolved(directory, ensemble):
-    path = directory / "resolved.nml"
-    try:
-        return path.read_text(encoding="utf-8"), str(path)
-    except FileNotFoundError:
-        text = ensemble.attributes.get("resolved_namelist", "")
-        return str(text), f"{directory / FILE_NAME}: resolved_namelist"
-    except OSError as cause:
-        raise PostError(f"{path}: cannot be read ({cause.strerror})") from cause
 
 
 def _read_spec(path, root, index, keys) -> FieldSpec:

@@ -18,6 +18,7 @@ from .field_figures import UNIT_TEXTS
 from .fits import LAWS
 from .noise_floor import noise_floor
 from .snapshots import find_snapshots, read_snapshot
+from .tables import null_for_nan, write_table
 
 #: Snapshots that are shown: the first of each case, at most so many; homogeneous ground first, then
 #: one of each autocorrelation function before a second one of any.
@@ -58,9 +59,9 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
         output.parent.mkdir(parents=True, exist_ok=True)
         _write_csv(output.parent, ensemble, summary)
         for name, rows in tables.items():
-            _write_table(output.parent / name, rows)
+            write_table(output.parent / name, rows)
         (output.parent / "report.json").write_text(
-            json.dumps(_finite({**summary, "provenance": ensemble.attributes}), indent=1)
+            json.dumps(null_for_nan({**summary, "provenance": ensemble.attributes}), indent=1)
         )
         for shown in drawn["configurations"]:
             name = f"{shown['label']}_r{shown['id']:06d}.png"
@@ -444,21 +445,3 @@ def _flat(row: dict, prefix: str = "") -> dict:
         inner = _flat(value, f"{prefix}{key}_") if isinstance(value, dict) else None
         flat.update({f"{prefix}{key}": value} if inner is None else inner)
     return flat
-
-
-def _write_table(path: Path, rows: list) -> None:
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-
-
-def _finite(value):
-    """The same with null for what is not finite, which JSON cannot hold."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

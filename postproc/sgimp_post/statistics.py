@@ -10,6 +10,8 @@ from scipy import stats
 CONFIDENCE = 0.95
 #: Fewest values for an interval of the standard deviation.
 FEWEST_FOR_SD = 8
+#: Numbers held at once.
+_BLOCK = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,13 @@ class Exceedance:
     probability: np.ndarray
     low: np.ndarray
     high: np.ndarray
+
+
+def blocks(samples: int, n: int):
+    """Numbers of samples of `n` values each that are held at once; they add up to `samples`."""
+    most = max(1, _BLOCK // n)
+    for first in range(0, samples, most):
+        yield min(most, samples - first)
 
 
 def finite(values) -> np.ndarray:
