@@ -165,6 +165,7 @@ contains
     this%materials%closes_all_gaps = any(words == 'gaps')
     this%materials%divides_always = any(words == 'dilation')
     if (any(words == 'exact_return')) this%materials%most_violation = -huge(1.0_wp)
+    if (any(words == 'cracks')) call this%particles%track_cracks()
     if (any(words == 'deformation')) call this%particles%track_deformation()
     if (any(words == 'plastic_strain')) call this%particles%track_plastic_strain()
   end subroutine do_needless
