@@ -38,6 +38,9 @@ module sg_particles
     real(wp), allocatable :: sxx(:), syy(:), szz(:), sxy(:)
     !> Volumetric opening of a point that carries no stress, [count]; a strain >= 0.
     real(wp), allocatable :: gap(:)
+    !> Stress that open cracks have taken (sg_cracks), xx, yy, zz, xy in Pa, [4, count]; size 0
+    !> where no point can crack. The volume of a cracked point leaves the cracks out.
+    real(wp), allocatable :: crack(:, :)
     !> Mohr-Coulomb strength, [count]: sine of the friction angle, 2 c cos(phi) in Pa, and the
     !> largest principal stress that the point can carry, min(tension strength, c cot(phi)), in Pa.
     !> Drucker-Prager points whose strength varies have their k and limit of mean stress here.
@@ -64,6 +67,8 @@ module sg_particles
     procedure :: is_measured
     procedure :: has_plastic_strain
     procedure :: has_deformation
+    procedure :: has_cracks
+    procedure :: track_cracks
     procedure :: track_plastic_strain
     procedure :: track_deformation
     procedure :: carry_gradient
@@ -83,7 +88,7 @@ contains
     allocate (this%gap(count), this%sin_friction(count), this%cohesion_term(count))
     allocate (this%tension_limit(count), this%friction_angle(count))
     allocate (this%width(count), this%height(count))
-    allocate (this%velocity_gradient(4, 0))
+    allocate (this%velocity_gradient(4, 0), this%crack(4, 0))
     allocate (this%plastic_strain(0), this%fxx(0), this%fxy(0), this%fyx(0), this%fyy(0))
     allocate (this%cohesion(0), this%undrained_strength(0), this%young(0), this%density(0))
     allocate (this%dilation_angle(0), this%sin_dilation(0))
@@ -119,6 +124,23 @@ contains
     logical :: has
     has = size(this%fxx) == this%count
   end function has_deformation
+
+  !> Are cracks kept?
+  pure function has_cracks(this) result(has)
+    class(particles_t), intent(in) :: this
+    logical :: has
+    has = size(this%crack, 2) == this%count
+  end function has_cracks
+
+  !> Keeps cracks from now on, from none.
+  subroutine track_cracks(this)
+    class(particles_t), intent(inout) :: this
+
+    if (this%has_cracks()) return
+    deallocate (this%crack)
+    allocate (this%crack(4, this%count))
+    this%crack = 0.0_wp
+  end subroutine track_cracks
 
   !> Keeps the plastic strain from now on, from 0.
   subroutine track_plastic_strain(this)

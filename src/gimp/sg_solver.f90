@@ -24,7 +24,7 @@ module sg_solver
   use sg_materials, only: material_t, MODEL_NEO_HOOKEAN
   use sg_neo_hookean, only: find_stretch
   use sg_particles, only: body_points_t, particles_t
-  use sg_stress_update, only: update_stress, wave_speed_squared
+  use sg_stress_update, only: can_crack, update_stress, wave_speed_squared
   use sg_transfer, only: gather_motion, gather_motion_and_gradient, map_body_force, map_force, &
     map_gradient, map_momentum, map_momentum_and_force
   use sg_weighting, only: axis_weights_interface, BLOCK, bspline_axis_weights, &
@@ -137,6 +137,7 @@ contains
       call this%particles%track_deformation()
     end if
     if (any(this%materials%softens)) call this%particles%track_plastic_strain()
+    if (can_crack(this%particles, this%materials)) call this%particles%track_cracks()
     this%averages_cells = config%solver%anti_locking == 'cell_average'
     if (config%loading%body_force == 'manufactured') this%amplitude = &
       real(config%loading%amplitude, wp)
@@ -164,6 +165,7 @@ contains
     this%materials%closes_all_gaps = any(words == 'gaps')
     this%materials%divides_always = any(words == 'dilation')
     if (any(words == 'exact_return')) this%materials%most_violation = -huge(1.0_wp)
+    if (any(words == 'cracks')) call this%particles%track_cracks()
     if (any(words == 'deformation')) call this%particles%track_deformation()
     if (any(words == 'plastic_strain')) call this%particles%track_plastic_strain()
   end subroutine do_needless

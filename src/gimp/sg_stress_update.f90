@@ -5,12 +5,13 @@
 !> E_p/E. The return of a stress asks only for Poisson's ratio: all that E decides are the strains
 !> it leaves. So it works with the nominal modulus, and these strains are divided by the stiffness.
 module sg_stress_update
+  use sg_cracks, only: crack_opening, turn_cracks
   use sg_drucker_prager, only: return_drucker_prager
   use sg_kinds, only: dp, wp
   use sg_linear_elastic, only: find_strain, predict_stress, strain_t, stress_power
   use sg_materials, only: material_t, MODEL_DRUCKER_PRAGER, MODEL_LINEAR_ELASTIC, &
     MODEL_MOHR_COULOMB, MODEL_NEO_HOOKEAN
-  use sg_mohr_coulomb, only: close_gap, release_open, return_stress
+  use sg_mohr_coulomb, only: close_gap, release_open, return_cracked
   use sg_neo_hookean, only: find_neo_hookean_stress, neo_hookean_wave_squared, &
     update_deformation
   use sg_particles, only: particles_t
@@ -19,7 +20,7 @@ module sg_stress_update
   implicit none
   private
 
-  public :: update_stress, return_block, wave_speed_squared
+  public :: update_stress, can_crack, return_block, wave_speed_squared
 
 contains
 
@@ -51,15 +52,15 @@ contains
           if (material%is_brittle) call release_block(p, material, first, last)
           call close_gap(n, time_step, gradient, p%gap(first:last), share)
         end if
+        if (p%has_cracks()) call turn_cracks(n, time_step, gradient, p%crack(:, first:last))
         if (size(p%young) > 0) then
           call predict_varied(p, material, first, last, time_step, gradient, share, strain, twice)
-          if (material%model /= MODEL_LINEAR_ELASTIC) call return_block(p, material, first, last)
         else
           call predict_stress(n, time_step, gradient, share, material%lame, material%shear, &
             p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%szz(first:last), &
             p%sxy(first:last), strain, twice)
-          if (material%model /= MODEL_LINEAR_ELASTIC) call return_nominal(p, material, first, last)
         end if
+        if (material%model /= MODEL_LINEAR_ELASTIC) call return_block(p, material, first, last)
       end if
       twice = twice + stress_power(n, strain, p%volume(first:last), p%sxx(first:last), &
         p%syy(first:last), p%sxy(first:last))
@@ -148,22 +149,47 @@ contains
     p%sxy(first:last) = stress(:n, 4)
   end subroutine hyperelastic_block
 
-  !> Returns the trial stresses of plastic points to their yield surface.
+  !> Can a point crack: has one a cut-off below the apex of its cone, or may softening give it one?
+  pure function can_crack(p, materials) result(can)
+    type(particles_t), intent(in) :: p
+    type(material_t), intent(in) :: materials(:)
+    logical :: can
+    integer :: body
+
+    can = .false.
+    do body = 1, size(p%bodies)
+      associate (b => p%bodies(body), m => materials(p%bodies(body)%material))
+        if (m%model /= MODEL_MOHR_COULOMB .or. m%is_undrained) cycle
+        can = can .or. any(p%cohesion_term(b%first:b%last) > merge(0.0_wp, 2.0_wp &
+          *p%sin_friction(b%first:b%last)*p%tension_limit(b%first:b%last), m%softens))
+      end associate
+    end do
+  end function can_crack
+
+  !> Returns the trial stresses of plastic points to their yield surface; what cracks open more than
+  !> they did leaves the volume.
   subroutine return_block(p, material, first, last)
     type(particles_t), intent(inout) :: p
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
-    real(wp) :: gap(BLOCK)
+    real(wp) :: gap(BLOCK), closed(BLOCK)
     integer :: n
 
+    n = last - first + 1
+    if (p%has_cracks()) closed(:n) = crack_opening(n, material%bulk, p%crack(:, first:last))
     if (size(p%young) > 0) then
-      n = last - first + 1
       gap(:n) = p%gap(first:last)
       call return_nominal(p, material, first, last)
       p%gap(first:last) = gap(:n) + (p%gap(first:last) - gap(:n)) &
         /stiffness(p, material, first, last)
     else
       call return_nominal(p, material, first, last)
+    end if
+    if (p%has_cracks()) then
+      closed(:n) = closed(:n) - crack_opening(n, material%bulk, p%crack(:, first:last))
+      if (.not. any(abs(closed(:n)) > 0.0_wp)) return
+      if (size(p%young) > 0) closed(:n) = closed(:n)/stiffness(p, material, first, last)
+      p%volume(first:last) = p%volume(first:last)*exp(closed(:n))
     end if
   end subroutine return_block
 
@@ -173,13 +199,14 @@ contains
     type(material_t), intent(in) :: material
     integer, intent(in) :: first, last
     real(wp) :: trial(BLOCK, 4), sin_dilation(BLOCK), k(BLOCK), mean_limit(BLOCK), strain(BLOCK)
-    integer :: n
+    integer :: n, last_crack
 
     n = last - first + 1
+    last_crack = merge(last, first - 1, p%has_cracks())
     if (material%softens) then
       call return_softening(n, material, first_strength(p, material, first, last), &
         p%plastic_strain(first:last), p%sxx(first:last), p%syy(first:last), p%szz(first:last), &
-        p%sxy(first:last), p%gap(first:last))
+        p%sxy(first:last), p%gap(first:last), p%crack(:, first:last_crack))
       return
     end if
     if (p%has_plastic_strain()) then
@@ -192,9 +219,9 @@ contains
     case (MODEL_MOHR_COULOMB)
       sin_dilation = material%sin_dilation
       if (size(p%sin_dilation) > 0) sin_dilation(:n) = p%sin_dilation(first:last)
-      call return_stress(n, material, p%sin_friction(first:last), p%cohesion_term(first:last), &
+      call return_cracked(n, material, p%sin_friction(first:last), p%cohesion_term(first:last), &
         p%tension_limit(first:last), sin_dilation, p%sxx(first:last), p%syy(first:last), &
-        p%szz(first:last), p%sxy(first:last), p%gap(first:last))
+        p%szz(first:last), p%sxy(first:last), p%gap(first:last), p%crack(:, first:last_crack))
     case (MODEL_DRUCKER_PRAGER)
       k = material%k
       mean_limit = material%mean_limit

@@ -15,7 +15,12 @@
 !> open the point carries no stress (one that was held by tension lets go of it); compression closes
 !> the gap first, and only the rest of the increment builds stress. Without it a grain that flew off
 !> would come back with several times its volume and full stiffness.
+!>
+!> Cracks: where the cut-off lies below the apex, what it opens in one or two directions while the
+!> point carries stress in the others is kept too (sg_cracks). At the apex it becomes part of the
+!> gap.
 module sg_mohr_coulomb
+  use sg_cracks, only: give_back
   use sg_kinds, only: wp
   use sg_materials, only: material_t
   use sg_rounding, only: COARSENESS, LEAST_STRESS
@@ -23,7 +28,7 @@ module sg_mohr_coulomb
   implicit none
   private
 
-  public :: close_gap, release_open, return_stress, return_principal
+  public :: close_gap, release_open, return_cracked, return_stress, return_principal
   public :: REGION_ELASTIC, REGION_PLANE, REGION_EDGE, REGION_CUT_OFF, REGION_APEX
 
   !> Where a trial stress was returned to.
@@ -105,24 +110,26 @@ contains
   end subroutine release_open
 
   !> Returns the trial stresses of `n` points to the yield surface, in place, and adds to the gap
-  !> of those at the apex.
+  !> of those at the apex. `crack` is set where the cut-off opens one.
   !> The plane is done for all points at once; the few on an edge, the cut-off or the apex follow
   !> one by one.
   pure subroutine return_stress(n, material, sin_friction, cohesion_term, tension_limit, &
-    sin_dilation, sxx, syy, szz, sxy, gap)
+    sin_dilation, sxx, syy, szz, sxy, gap, crack)
     integer, intent(in) :: n
     type(material_t), intent(in) :: material
     !> The last one is the sine of the dilation angle.
     real(wp), intent(in) :: sin_friction(n), cohesion_term(n), tension_limit(n), sin_dilation(n)
     real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n)
     real(wp), intent(inout) :: gap(n)
+    !> xx, yy, zz, xy in Pa.
+    real(wp), intent(inout), optional :: crack(4, n)
     type(principal_t) :: trial
     real(wp) :: d_first, d_middle, d_last, high, middle, low, new_a, new_b, compliance(BLOCK)
-    real(wp) :: centre, yield, multiplier, ratio, stress(4), opening
+    real(wp) :: centre, yield, multiplier, ratio, stress(4), opening, taken
     ! Above 0: the plane is not where the point belongs. A real and not a logical, so that the loop
     ! vectorises.
     real(wp) :: violation(BLOCK)
-    integer :: p
+    integer :: p, region
 
     call find_compliance(n, material, sin_friction, sin_dilation, compliance)
     !$omp simd private(centre, high, middle, low, yield, multiplier, new_a, new_b, ratio) &
@@ -160,14 +167,73 @@ contains
     do p = 1, n
       if (.not. violation(p) > material%most_violation) cycle
       call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p), &
-        sin_dilation(p)], trial, p, stress, opening)
+        sin_dilation(p)], trial, p, stress, opening, region)
       sxx(p) = stress(1)
       syy(p) = stress(2)
       szz(p) = stress(3)
       sxy(p) = stress(4)
       gap(p) = gap(p) + opening
+      if (.not. (present(crack) .and. region == REGION_CUT_OFF)) cycle
+      taken = trial%a(p) + trial%b(p) + trial%z(p)
+      if (maxval(abs(stress)) <= ROUNDING*(taken + cohesion_term(p))) then
+        ! Nothing is left but rounding, which must not decide whether this is the apex.
+        sxx(p) = 0.0_wp; syy(p) = 0.0_wp; szz(p) = 0.0_wp; sxy(p) = 0.0_wp
+        gap(p) = gap(p) + taken/(3.0_wp*material%bulk)
+      else
+        crack(:, p) = crack_stress(material, sin_dilation(p), trial, p, stress)
+      end if
     end do
   end subroutine return_stress
+
+  !> As return_stress, with a memory of the cut-off: `crack` is the stress that cracks have taken
+  !> (xx, yy, zz, xy in Pa) and, afterwards, that they take; [4, n], or [4, 0] for no memory.
+  pure subroutine return_cracked(n, material, sin_friction, cohesion_term, tension_limit, &
+    sin_dilation, sxx, syy, szz, sxy, gap, crack)
+    integer, intent(in) :: n
+    type(material_t), intent(in) :: material
+    real(wp), intent(in) :: sin_friction(n), cohesion_term(n), tension_limit(n), sin_dilation(n)
+    real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n), gap(n), crack(:, :)
+    real(wp) :: limit(n)
+
+    if (size(crack) == 0) then
+      call return_stress(n, material, sin_friction, cohesion_term, tension_limit, sin_dilation, &
+        sxx, syy, szz, sxy, gap)
+    else
+      limit = tension_limit
+      call give_back(n, crack, limit, sxx, syy, szz, sxy)
+      call return_stress(n, material, sin_friction, cohesion_term, limit, sin_dilation, sxx, syy, &
+        szz, sxy, gap, crack)
+    end if
+  end subroutine return_cracked
+
+  !> Stress D e_c that the cracks of point `p` of the block have taken, (xx, yy, zz, xy), once the
+  !> cut-off has returned its trial stress to `stress`.
+  !> The cone shortens one or two principal directions by N in all and widens the others by N (1 +
+  !> sin(psi))/(1 - sin(psi)); what these have widened beyond that, e_c, is the cut-off's.
+  pure function crack_stress(material, sin_dilation, trial, p, stress) result(crack)
+    type(material_t), intent(in) :: material
+    real(wp), intent(in) :: sin_dilation, stress(4)
+    type(principal_t), intent(in) :: trial
+    integer, intent(in) :: p
+    real(wp) :: crack(4), taken(3), strain(3), opened(3), mean, radius, widening
+
+    radius = max(trial%radius(p), LEAST_STRESS)
+    mean = 0.5_wp*(stress(1) + stress(2))
+    associate (along => (0.5_wp*(stress(1) - stress(2))*trial%half_difference(p) &
+      + stress(4)*trial%shear_stress(p))/radius)
+      taken = [trial%a(p) - (mean + along), trial%b(p) - (mean - along), trial%z(p) - stress(3)]
+    end associate
+    strain = (taken - material%lame/(3.0_wp*material%bulk)*sum(taken))/(2.0_wp*material%shear)
+    opened = max(strain, 0.0_wp)
+    widening = -sum(min(strain, 0.0_wp))*(1.0_wp + sin_dilation)/(1.0_wp - sin_dilation)
+    opened = opened*max(1.0_wp - widening/max(sum(opened), tiny(1.0_wp)), 0.0_wp)
+    taken = material%lame*sum(opened) + 2.0_wp*material%shear*opened
+    mean = 0.5_wp*(taken(1) + taken(2))
+    associate (ratio => 0.5_wp*(taken(1) - taken(2))/radius)
+      crack = [mean + ratio*trial%half_difference(p), mean - ratio*trial%half_difference(p), &
+        taken(3), ratio*trial%shear_stress(p)]
+    end associate
+  end function crack_stress
 
   !> Multiplier of the plane over the yield function, 1/(4 G + 4 (lambda + G) sin(phi) sin(psi)), in
   !> 1/Pa: the same for all points that do not dilate, who are spared the division.
@@ -191,16 +257,16 @@ contains
 
   !> Point `p` of the block, whose return is not to the plane: sorts its principal stresses, returns
   !> them, and turns them back to `stress` = (xx, yy, zz, xy). `opening`: volumetric strain that the
-  !> apex left without stress.
-  pure subroutine return_special(material, strength, trial, p, stress, opening)
+  !> apex left without stress; `region`: a REGION_ constant.
+  pure subroutine return_special(material, strength, trial, p, stress, opening, region)
     type(material_t), intent(in) :: material
     !> sin(phi), 2 c cos(phi), T, sin(psi)
     real(wp), intent(in) :: strength(4)
     type(principal_t), intent(in) :: trial
     integer, intent(in) :: p
     real(wp), intent(out) :: stress(4), opening
+    integer, intent(out) :: region
     real(wp) :: returned(3), new_a, new_b, new_z, ratio
-    integer :: region
 
     associate (a => trial%a(p), b => trial%b(p), z => trial%z(p))
       if (z >= a) then

@@ -12,7 +12,7 @@
 module sg_softening
   use sg_kinds, only: wp
   use sg_materials, only: material_t, mohr_coulomb_strength
-  use sg_mohr_coulomb, only: return_stress
+  use sg_mohr_coulomb, only: return_cracked
   use sg_rounding, only: COARSENESS
   use sg_weighting, only: BLOCK
   implicit none
@@ -34,14 +34,17 @@ module sg_softening
 
 contains
 
-  !> As return_stress, with strength and dilation from `plastic_strain`, which grows. A point that
+  !> As return_cracked, with strength and dilation from `plastic_strain`, which grows. A point that
   !> is weaker than the residual strength of its material from the `first` does not soften.
-  subroutine return_softening(n, material, first, plastic_strain, sxx, syy, szz, sxy, gap)
+  subroutine return_softening(n, material, first, plastic_strain, sxx, syy, szz, sxy, gap, &
+    crack)
     integer, intent(in) :: n
     type(material_t), intent(in) :: material
     type(first_strength_t), intent(in) :: first
-    real(wp), intent(inout) :: plastic_strain(n), sxx(n), syy(n), szz(n), sxy(n), gap(n)
-    real(wp) :: trial(BLOCK, 4), first_gap(n), kappa(n), next(n), change
+    real(wp), intent(inout) :: plastic_strain(n), sxx(n), syy(n), szz(n), sxy(n), gap(n), &
+      crack(:, :)
+    real(wp) :: trial(BLOCK, 4), first_gap(n), first_crack(4, size(crack, 2))
+    real(wp) :: kappa(n), next(n), change
     integer :: round
 
     trial(:n, 1) = sxx
@@ -49,6 +52,7 @@ contains
     trial(:n, 3) = szz
     trial(:n, 4) = sxy
     first_gap = gap
+    first_crack = crack
     kappa = plastic_strain
     do round = 1, MOST_ROUNDS
       call return_with(kappa)
@@ -88,8 +92,9 @@ contains
       szz = trial(:n, 3)
       sxy = trial(:n, 4)
       gap = first_gap
-      call return_stress(n, material, sin_friction, cohesion_term, tension_limit, sin_dilation, &
-        sxx, syy, szz, sxy, gap)
+      crack = first_crack
+      call return_cracked(n, material, sin_friction, cohesion_term, tension_limit, sin_dilation, &
+        sxx, syy, szz, sxy, gap, crack)
     end subroutine return_with
   end subroutine return_softening
 
