@@ -346,10 +346,9 @@ contains
       if (desk%config%solver%threads > 1 .and. .not. has_threads()) call desk%fault('solver', 1, &
         'threads', 'this program was built without OpenMP (allowed: 1)')
     end if
-    if (desk%good('solver', 1, 'model')) then
-      if (desk%config%solver%model == 'linear_functional' .and. .not. desk%config%has_random_field) &
-        call desk%fault('solver', 1, 'model', "'linear_functional' is one of a random field "// &
-        '(allowed: with &random_field)')
+    if (desk%good('solver', 1, 'model') .and. .not. desk%config%has_random_field) then
+      if (desk%config%solver%model == 'linear_functional') call desk%fault('solver', 1, 'model', &
+        "'linear_functional' is one of a random field (allowed: with &random_field)")
     end if
     if (.not. desk%good('solver', 1, 'time_step end_time')) return
     associate (solver => desk%config%solver)

@@ -42,8 +42,9 @@ contains
       return
     end if
     associate (owner => KEYS(rows(1))%group)
-      if (owner == 'random_field' .and. occurrence < 2 .and. (key == 'acf' .or. key == 'cov')) &
+      if (owner == 'random_field' .and. occurrence < 2 .and. (key == 'acf' .or. key == 'cov')) then
         fault = 'of the first field this is &study '//key//' (write '//key//')'
+      end if
       if (GROUPS(group_row(owner))%repeatable) then
         k = nml%count(trim(owner))
         if (k == 0) then

@@ -1,6 +1,6 @@
-!> Importance sampling of a Gaussian field: its white noise w, z = A w, is shifted along
-!> u = A^T a/|A^T a|, a = 1/n for each of the n points, by `shift` standard deviations of the mean of
-!> z: the direction in which a^T z grows most (Au & Beck 1999, for a linear limit state). So z is
+!> Importance sampling of a Gaussian field: its white noise w, z = A w, is shifted along u = A^T a/
+!> |A^T a|, a = 1/n for each of the n points, by `shift` standard deviations of the mean of z: the
+!> direction in which a^T z grows most (Au & Beck 1999, for a linear limit state). So z is
 !> shifted by shift C a/s with s^2 = a^T C a, and a member weighs exp(-shift a^T z/s - shift^2/2),
 !> z before the shift.
 module sg_tilt
@@ -40,7 +40,8 @@ contains
     this%direction = this%direction/this%sd_of_mean
   end subroutine aim
 
-  !> Shifts a realization z; `log_weight` is the logarithm of its likelihood ratio, 0 without a shift.
+  !> Shifts a realization z; `log_weight` is the logarithm of its likelihood ratio, 0 without a
+  !> shift.
   pure subroutine apply(this, z, log_weight)
     class(tilt_t), intent(in) :: this
     real(wp), intent(inout) :: z(:)

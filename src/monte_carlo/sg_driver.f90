@@ -385,8 +385,8 @@ contains
       s = director%statistics_of(i)
       if (s%count == 0) cycle
       text = director%results(i)%label//': runout_q995 mean '//to_text(s%mean, 6)
-      if (s%half_width < huge(1.0_wp)) text = text//' +- '//to_text(s%half_width, 3)//' m (95 %), sd '// &
-        to_text(s%sd, 4)
+      if (s%half_width < huge(1.0_wp)) text = text//' +- '//to_text(s%half_width, 3)// &
+        ' m (95 %), sd '//to_text(s%sd, 4)
       call director%progress%say(text//' m, n='//to_text(s%count)//' (ids '// &
         to_text(director%plan%first)//'-'//to_text(director%plan%first + director%prefix_of(i) &
         - 1)//')')
