@@ -193,16 +193,16 @@ contains
     type(material_t), intent(in) :: material
     real(wp), intent(in) :: sin_friction(n), cohesion_term(n), tension_limit(n), sin_dilation(n)
     real(wp), intent(inout) :: sxx(n), syy(n), szz(n), sxy(n), gap(n), crack(:, :)
-    real(wp) :: limit(n)
+    real(wp) :: limit(BLOCK)
 
     if (size(crack) == 0) then
       call return_stress(n, material, sin_friction, cohesion_term, tension_limit, sin_dilation, &
         sxx, syy, szz, sxy, gap)
     else
-      limit = tension_limit
-      call give_back(n, crack, limit, sxx, syy, szz, sxy)
-      call return_stress(n, material, sin_friction, cohesion_term, limit, sin_dilation, sxx, syy, &
-        szz, sxy, gap, crack)
+      limit(:n) = tension_limit
+      call give_back(n, crack, limit(:n), sxx, syy, szz, sxy)
+      call return_stress(n, material, sin_friction, cohesion_term, limit(:n), sin_dilation, sxx, &
+        syy, szz, sxy, gap, crack)
     end if
   end subroutine return_cracked
 
