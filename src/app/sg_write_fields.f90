@@ -31,13 +31,12 @@ contains
     logical :: is_there
     integer :: i
 
-    allocate (records, source=model%grounds(model%field_ground())%field_records())
     is_there = file_exists(options%write_fields)
     if (is_there .and. .not. options%overwrite) then
       call raise(error, EXIT_BAD_INPUT, options%write_fields//' is there already (allowed: '// &
         '--overwrite, or another name)', 'write_fields')
       return
-    else if (size(records) == 0) then
+    else if (.not. model%grounds(1)%config%has_random_field) then
       call raise(error, EXIT_BAD_INPUT, 'the case has no random field to write', 'write_fields')
       return
     end if
@@ -55,7 +54,7 @@ contains
           'cov are written case by case: give --study-case', 'write_fields')
         return
       end if
-      records = model%grounds(variant)%field_records()
+      allocate (records, source=model%grounds(variant)%field_records())
     end associate
     if (ends_with(options%write_fields, '.csv') .and. (size(chosen) > 1 .or. &
       options%realization == 0 .or. size(records) > 1)) then

@@ -249,16 +249,9 @@ contains
     integer, intent(in) :: choice(:)
     logical, intent(in), optional :: wanted(:)
     character(len=:), allocatable :: text
-    integer :: k
 
-    text = ''
-    do k = 1, size(lists)
-      if (present(wanted)) then
-        if (.not. wanted(k)) cycle
-      end if
-      if (text /= '') text = text//', '
-      text = text//short_name(lists, k)//'='//trim(lists(k)%values(choice(k)))
-    end do
+    text = chosen(lists, choice, ', ', '=', '=', wanted)
+    if (text /= '') text = text(3:)
   end function text_of_choice
 
   !> The same for labels, where numbers stand close to their key and words behind a dash:
@@ -268,6 +261,17 @@ contains
     integer, intent(in) :: choice(:)
     logical, intent(in), optional :: wanted(:)
     character(len=:), allocatable :: text
+
+    text = chosen(lists, choice, '_', '', '-', wanted)
+  end function suffix_of_choice
+
+  !> Keys and values, with `before` before each key and a mark before its number or word.
+  pure function chosen(lists, choice, before, number_mark, word_mark, wanted) result(text)
+    type(study_list_t), intent(in) :: lists(:)
+    integer, intent(in) :: choice(:)
+    character(len=*), intent(in) :: before, number_mark, word_mark
+    logical, intent(in), optional :: wanted(:)
+    character(len=:), allocatable :: text, mark
     integer :: k
 
     text = ''
@@ -275,9 +279,9 @@ contains
       if (present(wanted)) then
         if (.not. wanted(k)) cycle
       end if
-      text = text//'_'//short_name(lists, k)
-      if (KEYS(lists(k)%row)%kind == KIND_WORD) text = text//'-'
-      text = text//trim(lists(k)%values(choice(k)))
+      mark = number_mark
+      if (KEYS(lists(k)%row)%kind == KIND_WORD) mark = word_mark
+      text = text//before//short_name(lists, k)//mark//trim(lists(k)%values(choice(k)))
     end do
-  end function suffix_of_choice
+  end function chosen
 end module sg_study

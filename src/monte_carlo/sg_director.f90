@@ -11,7 +11,8 @@ module sg_director
   use sg_posix, only: caught_signal, file_exists
   use sg_progress, only: json_text, progress_t
   use sg_scheduler, only: CARRY_ON, director_t, FINISH_STARTED, STOP_NOW
-  use sg_statistics, only: contiguous_prefix, describe, mean_interval, sample_statistics_t
+  use sg_statistics, only: contiguous_prefix, describe, mean_interval, sample_statistics_t, &
+    whole_groups
   use sg_text, only: to_text
   use sg_timer, only: wall_seconds
   implicit none
@@ -198,7 +199,7 @@ contains
     do i = 1, size(this%results)
       n = this%prefix_of(i)
       if (n == 0 .or. n < most) cycle
-      if (n == most .and. .not. this%results(best)%is_homogeneous) cycle
+      if (n == most .and. this%results(best)%role /= 'homogeneous') cycle
       best = i
       most = n
     end do
@@ -246,14 +247,13 @@ contains
     real(wp), intent(in) :: values(:)
     logical, intent(in) :: good(:)
     type(sample_statistics_t), intent(inout) :: statistics
-    logical :: whole(size(values)/2)
+    real(wp), allocatable :: pairs(:, :)
     real(wp) :: interval(2)
 
-    whole = good(:2*size(whole):2) .and. good(2::2)
-    interval = mean_interval(reshape(pack(values(:2*size(whole)), &
-      reshape(spread(whole, 1, 2), [2*size(whole)])), [2, count(whole)]))
+    allocate (pairs, source=whole_groups(values, good, 2))
+    interval = mean_interval(pairs)
     statistics%half_width = huge(1.0_wp)
-    if (count(whole) > 1) statistics%half_width = 0.5_wp*(interval(2) - interval(1))
+    if (size(pairs, 2) > 1) statistics%half_width = 0.5_wp*(interval(2) - interval(1))
   end subroutine take_pairs
 
   !> Puts on disk, at once, all members that came in since the last time. Nothing is told of a

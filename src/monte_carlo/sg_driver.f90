@@ -182,7 +182,6 @@ contains
         r%acf = trim(c%acf)
         r%cov = c%cov
         r%mean = c%mean
-        r%is_homogeneous = c%is_homogeneous
         r%distribution = trim(c%distribution)
         r%scale_x = c%scale_x
         r%scale_y = c%scale_y

@@ -11,7 +11,7 @@ module sg_statistics
   private
 
   public :: sample_statistics_t, describe, contiguous_prefix
-  public :: mean_interval, sd_interval, share_interval
+  public :: whole_groups, mean_interval, sd_interval, share_interval
 
   !> Phi^-1(0.975).
   real(wp), parameter :: NORMAL_QUANTILE_975 = 1.959963984540054_wp
@@ -58,6 +58,21 @@ contains
       if (.not. present(length + 1)) return
     end do
   end function contiguous_prefix
+
+  !> Groups of `group_size` members one after another of which all are `usable`, [group_size,
+  !> groups]; an incomplete last one is left out.
+  pure function whole_groups(values, usable, group_size) result(members)
+    real(wp), intent(in) :: values(:)
+    logical, intent(in) :: usable(:)
+    integer, intent(in) :: group_size
+    real(wp), allocatable :: members(:, :)
+    logical :: whole(size(values)/group_size)
+
+    associate (g => group_size, n => group_size*size(whole))
+      whole = all(reshape(usable(:n), [g, size(whole)]), dim=1)
+      members = reshape(pack(values(:n), reshape(spread(whole, 1, g), [n])), [g, count(whole)])
+    end associate
+  end function whole_groups
 
   !> Interval of the mean by Student's t, over the means of the groups; without end for one group.
   pure function mean_interval(members) result(interval)

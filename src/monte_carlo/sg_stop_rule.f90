@@ -10,7 +10,7 @@ module sg_stop_rule
   use sg_kinds, only: wp
   use sg_outcome, only: COLUMN_COUNT, COLUMNS, RUNOUT_Q995
   use sg_statistics, only: describe, mean_interval, sample_statistics_t, sd_interval, &
-    share_interval
+    share_interval, whole_groups
   use sg_text, only: to_text
   implicit none
   private
@@ -152,15 +152,9 @@ contains
     real(wp), intent(out) :: needed
     real(wp), allocatable :: members(:, :)
     type(sample_statistics_t) :: statistics
-    logical :: whole(size(values)/this%group_size)
-    integer :: g
 
     needed = huge(1.0_wp)
-    g = this%group_size
-    ! Groups of which no member failed.
-    whole = all(reshape(usable(:g*size(whole)), [g, size(whole)]), dim=1)
-    members = reshape(pack(values(:g*size(whole)), reshape(spread(whole, 1, g), &
-      [g*size(whole)])), [g, count(whole)])
+    allocate (members, source=whole_groups(values, usable, this%group_size))
     if (size(members, 2) < 2) return
     statistics = describe(reshape(members, [size(members)]), spread(.true., 1, size(members)))
     select case (this%statistic)

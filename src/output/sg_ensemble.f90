@@ -40,7 +40,6 @@ module sg_ensemble
     !> Of the property of the first random field.
     character(len=:), allocatable :: field_units
     real(wp) :: cov = 0.0_wp, mean = 0.0_wp, scale_x = 0.0_wp, scale_y = 0.0_wp
-    logical :: is_homogeneous = .false.
     !> The case ended early, by its rule.
     logical :: stop_rule_met = .false.
     !> [members]
@@ -228,7 +227,7 @@ contains
     call file%set(group, 'distribution', results%distribution)
     call file%set(group, 'scale_x', results%scale_x)
     call file%set(group, 'scale_y', results%scale_y)
-    call file%set(group, 'is_homogeneous', merge(1_i4, 0_i4, results%is_homogeneous))
+    call file%set(group, 'is_homogeneous', merge(1_i4, 0_i4, results%role == 'homogeneous'))
     call file%set(group, 'planned', int(size(results%present), i4))
     call file%set(group, 'stop_rule_met', merge(1_i4, 0_i4, results%stop_rule_met))
     call file%set(group, 'order', int(order, i4))
