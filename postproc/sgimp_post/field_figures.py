@@ -5,47 +5,14 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 
-from .figures import ACF_COLOURS, INK, OTHER, styled
 from .samplers import find_lattice
+from .style import INK, acf_colour, acf_text, axis_label, styled
 
 #: Members whose fields are drawn.
 SHOWN_MEMBERS = 4
-ACF_TEXTS = {"matern32": "Matérn 3/2", "matern52": "Matérn 5/2", "matern": "Matérn"}
-PROPERTY_TEXTS = {
-    "friction_angle": "friction angle",
-    "tan_friction_angle": "tan(friction angle)",
-    "cohesion": "cohesion",
-    "undrained_strength": "undrained strength",
-    "young": "Young's modulus",
-    "density": "density",
-    "dilation_angle": "dilation angle",
-}
-UNIT_TEXTS = {"deg": "°", "degree": "°", "degrees": "°", "1": "–", "": "–", "kg/m3": "kg/m³"}
-#: Unit, factor and text for values that are large in SI.
-LARGE_UNITS = {"Pa": ((1e6, "MPa"), (1e3, "kPa"))}
-
 
 _COV_MARKERS = ("o", "s", "^", "D", "v")
 _DOTS = {"marker": "o", "ls": "", "ms": 3.4, "mec": INK, "mfc": "white", "mew": 0.9}
-
-
-def acf_text(acf: str) -> str:
-    return ACF_TEXTS.get(acf, acf.upper() if len(acf) <= 3 else acf)
-
-
-def tint(acf: str) -> str:
-    return ACF_COLOURS.get(acf, OTHER)
-
-
-def axis_label(spec, typical: float):
-    """'property [unit]' and the number that the values are divided by."""
-    name = PROPERTY_TEXTS.get(spec.property, spec.property)
-    if spec.name != spec.property:
-        name = f"{spec.name}, {name}"
-    for factor, unit in LARGE_UNITS.get(spec.units, ()):
-        if abs(typical) >= factor:
-            return f"{name} [{unit}]", factor
-    return f"{name} [{UNIT_TEXTS.get(spec.units, spec.units)}]", 1.0
 
 
 @styled
@@ -96,7 +63,7 @@ def maps_figure(spec, rows):
             rotation=90,
             ha="center",
             va="center",
-            color=tint(acf),
+            color=acf_colour(acf),
             fontweight="bold",
         )
     bar = figure.colorbar(
@@ -149,7 +116,7 @@ def correlation_figure(entries):
     )
     least = 0.0
     for column, entry in enumerate(entries):
-        shade = tint(entry["acf"])
+        shade = acf_colour(entry["acf"])
         for row, curve in enumerate(entry["correlation"]):
             main, rest = axes[2 * row, column], axes[2 * row + 1, column]
             value, target = np.array(curve["value"]), np.array(curve["target"])
@@ -209,7 +176,7 @@ def quantile_figure(spec, entries):
     for entry in entries:
         k = covs.index(entry["cov"])
         main, rest = axes[:, columns.index(entry["acf"])]
-        shade = tint(entry["acf"])
+        shade = acf_colour(entry["acf"])
         target, sample, low, high = (
             np.array(entry["qq"][key], dtype=float) / factor
             for key in ("target", "sample", "low", "high")
@@ -229,7 +196,7 @@ def quantile_figure(spec, entries):
         rest.fill_between(target, low - target, high - target, color=shade, alpha=0.2, lw=0)
         rest.plot(target, sample - target, **dots)
     for k, acf in enumerate(columns):
-        axes[0, k].set_title(acf_text(acf), color=tint(acf), fontweight="bold")
+        axes[0, k].set_title(acf_text(acf), color=acf_colour(acf), fontweight="bold")
         axes[1, k].axhline(0.0, color=INK, lw=0.9, ls=(0, (4, 2)), zorder=1)
     axes[0, 0].legend(loc="upper left")
     axes[0, 0].set_ylabel(f"quantile of the members {unit}")

@@ -10,7 +10,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import h5py
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -19,6 +18,7 @@ from .errors import PostError
 from .field_audit import audit
 from .random_fields import read_random_fields
 from .snapshots import find_snapshots
+from .style import Gallery
 from .tables import null_for_nan
 
 #: Members of an audit if none are named: enough to see an error of the standard deviation of 1 %
@@ -123,15 +123,10 @@ def _draw(fields, numbers, directory) -> None:
         }
         if any(curve["lag"] for entry in entries for curve in entry["correlation"]):
             drawn["correlation"] = field_figures.correlation_figure(list(by_acf.values()))
+        gallery = Gallery()
         for kind, figure in drawn.items():
-            for suffix in ("png", "svg"):
-                figure.savefig(
-                    directory / f"{kind}_{_file_name(spec.name)}.{suffix}",
-                    dpi=150,
-                    bbox_inches="tight",
-                    metadata={"Date": None} if suffix == "svg" else None,
-                )
-            plt.close(figure)
+            gallery.add(f"{kind}_{_file_name(spec.name)}", figure)
+        gallery.write(directory)
 
 
 def _file_name(name: str) -> str:

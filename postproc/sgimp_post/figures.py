@@ -1,14 +1,8 @@
-"""The pictures of the report. One style; a fixed colour for each autocorrelation function."""
+"""The pictures of the report that come from the columns of the ensemble."""
 
 from __future__ import annotations
 
-import base64
-import io
-
 import matplotlib
-
-matplotlib.use("Agg")
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -16,6 +10,7 @@ from .ensemble import RUNOUTS
 from .fits import LAWS, distribution_of, fit_laws
 from .importance import weighted_probability
 from .statistics import describe, exceedance, finite, running
+from .style import INK, LAW_STYLES, OTHER, acf_colour, colour, styled
 
 #: Values up to which each one has its tick below the histogram; a tick takes 230 bytes of SVG.
 MOST_TICKS = 200
@@ -23,71 +18,6 @@ MOST_TICKS = 200
 #: Bins of a histogram at most. Freedman and Diaconis count range over spread: one far value among
 #: values close together would ask for millions.
 MOST_BINS = 100
-
-#: Okabe and Ito's palette, told apart by colour-blind readers.
-ACF_COLOURS = {
-    "snx": "#D55E00",
-    "sqx": "#0072B2",
-    "smk": "#009E73",
-    "csx": "#CC79A7",
-    "bin": "#7A6A00",
-    "matern32": "#E69F00",
-    "matern52": "#56B4E9",
-    "matern": "#000000",
-    "spherical": "#8C4B2F",
-}
-LAW_STYLES = {
-    "normal": ("#0072B2", "-"),
-    "lognormal": ("#009E73", "--"),
-    "gumbel": ("#D55E00", "-"),
-    "weibull": ("#7F7F7F", ":"),
-}
-OTHER = "#3B5B7A"
-INK = "#22303C"
-STYLE = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9,
-    "axes.edgecolor": "#8795A1",
-    "axes.labelcolor": INK,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#E4E9ED",
-    "text.color": INK,
-    "xtick.color": "#52616B",
-    "ytick.color": "#52616B",
-    "legend.frameon": False,
-    "legend.fontsize": 8,
-    "figure.constrained_layout.use": True,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "sgimp",
-}
-
-
-def colour(case) -> str:
-    return ACF_COLOURS.get(case.acf, OTHER)
-
-
-def data_uri(figure, kind: str = "svg", dpi: int = 130) -> str:
-    """The figure as a data URI; closes it."""
-    buffer = io.BytesIO()
-    metadata = {"Date": None} if kind == "svg" else None
-    figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
-    plt.close(figure)
-    mime = {"svg": "image/svg+xml", "png": "image/png"}[kind]
-    return f"data:{mime};base64,{base64.b64encode(buffer.getvalue()).decode('ascii')}"
-
-
-def styled(draw):
-    """Runs a drawing function under the style of the report."""
-
-    def inner(*args, **kwargs):
-        with matplotlib.rc_context(STYLE):
-            return draw(*args, **kwargs)
-
-    return inner
 
 
 @styled
@@ -244,14 +174,14 @@ def study_figure(summary: dict):
             got = [row["runouts"][name] for row in rows]
             y = np.array([row[value] for row in got])
             span = [y - [row[low] for row in got], [row[high] for row in got] - y]
-            tint = ACF_COLOURS.get(acf, OTHER)
+            tint = acf_colour(acf)
             axis.errorbar(
                 x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper()
             )
         shares = [row["exceedance"] for row in rows]
         y = np.array([row["value"] for row in shares])
         span = [y - [row["low"] for row in shares], [row["high"] for row in shares] - y]
-        tint = ACF_COLOURS.get(acf, OTHER)
+        tint = acf_colour(acf)
         axes[2].errorbar(x, y, np.abs(span), color=tint, marker="o", ms=4, capsize=2, lw=1.3)
     _mark_deterministic(axes[0], floor, vertical=False)
     if np.isfinite(floor["sd"]):
@@ -280,7 +210,7 @@ def soil_figure(summary: dict):
         value, low, high = (
             np.clip([share[key] for share in shares], 0.0, 1.0) for key in ("value", "low", "high")
         )
-        tints = [ACF_COLOURS.get(case["acf"], OTHER) for case in cases]
+        tints = [acf_colour(case["acf"]) for case in cases]
         axis.hlines(y, low, high, color=tints, lw=2.2, alpha=0.55)
         axis.scatter(value, y, color=tints, s=18, zorder=3)
         axis.set_title(words)
@@ -395,7 +325,12 @@ def configuration_figure(snapshot, geometry):
             }
         )
         drawn = axis.scatter(
-            *state.position.T, s=max(points**2 * 0.9, 0.3), marker="s", lw=0, **tint
+            *state.position.T,
+            s=max(points**2 * 0.9, 0.3),
+            marker="s",
+            lw=0,
+            rasterized=True,
+            **tint,
         )
         axis.set_aspect("equal")
         axis.set_xlim(left - 0.02 * width, left + 1.02 * width)

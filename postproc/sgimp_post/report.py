@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import json
 import math
@@ -14,10 +13,10 @@ from . import __version__, figures
 from .analysis import analyse
 from .ensemble import FLOAT_COLUMNS, INTEGER_COLUMNS, RUNOUTS, STATUS_TEXTS, read_ensemble
 from .errors import PostError
-from .field_figures import UNIT_TEXTS
 from .fits import LAWS
 from .noise_floor import noise_floor
 from .snapshots import find_snapshots, read_snapshot
+from .style import UNIT_TEXTS, Gallery
 from .tables import null_for_nan, write_table
 
 #: Snapshots that are shown: the first of each case, at most so many; homogeneous ground first, then
@@ -35,7 +34,8 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
     ensemble = read_ensemble(directory)
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
-    drawn = _figures(ensemble, summary)
+    gallery = Gallery()
+    drawn = _figures(ensemble, summary, gallery)
     tables = _tables(summary)
     html = (
         _environment()
@@ -63,9 +63,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
         (output.parent / "report.json").write_text(
             json.dumps(null_for_nan({**summary, "provenance": ensemble.attributes}), indent=1)
         )
-        for shown in drawn["configurations"]:
-            name = f"{shown['label']}_r{shown['id']:06d}.png"
-            (output.parent / name).write_bytes(base64.b64decode(shown["image"].split(",")[1]))
+        gallery.write(output.parent / "figures")
         output.write_text(html, encoding="utf-8")
     except OSError as cause:
         raise PostError(f"{output.parent}: cannot be written ({cause.strerror})") from cause
@@ -279,7 +277,7 @@ def warnings(summary: dict) -> list:
     return found
 
 
-def _figures(ensemble, summary: dict) -> dict:
+def _figures(ensemble, summary: dict, gallery: Gallery) -> dict:
     """Data URIs by the names of the template; None or empty where there is nothing to draw."""
     name = summary["primary"]
     floors = {label: floor[name] for label, floor in summary["floors"].items()}
@@ -290,31 +288,32 @@ def _figures(ensemble, summary: dict) -> dict:
     plain = [] if ensemble.is_weighted else drawn
     covs = {case.cov for case in plain}
     is_by_cov = len(covs) > 1 and not any(case.varied for case in plain)
-    profile = figures.profile_figure(
-        (plain if ensemble.is_weighted else cases)
-        or [case for case in ensemble.cases if case.is_homogeneous]
-    )
+    deposits = plain if ensemble.is_weighted else cases
+    shown = {
+        "comparison": figures.comparison_figure(plain, name, shared) if len(plain) > 1 else None,
+        "study": figures.study_figure(summary) if is_by_cov else None,
+        "soil": figures.soil_figure(summary) if len(plain) > 1 else None,
+        "weighted": figures.weighted_figure(drawn, name, shared)
+        if ensemble.is_weighted and drawn
+        else None,
+        "profiles": figures.profile_figure(
+            deposits or [case for case in ensemble.cases if case.is_homogeneous]
+        ),
+    }
     return {
+        **{key: gallery.add(key, figure) for key, figure in shown.items()},
         "case_figures": {
-            case.label: figures.data_uri(
-                figures.case_figure(case, name, floors.get(case.noise_case, unknown))
+            case.label: gallery.add(
+                f"case_{case.label}",
+                figures.case_figure(case, name, floors.get(case.noise_case, unknown)),
             )
             for case in plain[:MOST_CASES]
         },
-        "comparison": figures.data_uri(figures.comparison_figure(plain, name, shared))
-        if len(plain) > 1
-        else None,
-        "study": figures.data_uri(figures.study_figure(summary)) if is_by_cov else None,
-        "soil": figures.data_uri(figures.soil_figure(summary)) if len(plain) > 1 else None,
-        "weighted": figures.data_uri(figures.weighted_figure(drawn, name, shared))
-        if ensemble.is_weighted and drawn
-        else None,
-        "profiles": figures.data_uri(profile) if profile else None,
-        "configurations": _configurations(ensemble),
+        "configurations": _configurations(ensemble, gallery),
     }
 
 
-def _configurations(ensemble) -> list:
+def _configurations(ensemble, gallery: Gallery) -> list:
     shown, labels = [], set()
     rank, seen = {}, {}
     for order, case in enumerate(ensemble.cases):
@@ -328,9 +327,8 @@ def _configurations(ensemble) -> list:
         figure = snapshot and figures.configuration_figure(snapshot, ensemble.case(label).geometry)
         if figure:
             labels.add(label)
-            shown.append(
-                {"label": label, "id": member, "image": figures.data_uri(figure, "png", 100)}
-            )
+            image = gallery.add(f"{label}_r{member:06d}", figure)
+            shown.append({"label": label, "id": member, "image": image})
     return shown
 
 

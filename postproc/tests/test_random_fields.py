@@ -580,7 +580,7 @@ def test_audit_of_sound_fields_finds_no_fault(tmp_path, capsys):
     with open(tmp_path / "fields" / "audit.csv", newline="", encoding="utf-8") as file:
         assert len(list(csv.DictReader(file))) == len(numbers["checks"])
     for kind in ("maps", "correlation", "quantiles"):
-        for suffix in ("png", "svg"):
+        for suffix in ("svg", "pdf"):
             assert (tmp_path / "fields" / f"{kind}_phi.{suffix}").stat().st_size > 5000
 
 
