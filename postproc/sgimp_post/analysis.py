@@ -7,6 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from .ensemble import RUNOUTS, STATUS_TEXTS
+from .events import EVENTS_NAME, rank_seconds, read_starts
 from .fits import best_fit, fit_laws, rivals
 from .importance import (
     effective_size,
@@ -20,6 +21,9 @@ from .pairs import paired_experiments
 from .statistics import describe, describe_pairs, wilson
 from .two_level import control_estimates
 
+#: Of all ranks together, below which the share that members took is not told: the clock of the
+#: events goes in seconds.
+FEWEST_SECONDS = 100.0
 #: Exceedances whose runout is looked up in a run with importance sampling.
 RARE = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
@@ -166,8 +170,13 @@ def _failures(ensemble) -> list:
 def _cost(ensemble) -> dict:
     seconds = np.concatenate([case.column("seconds") for case in ensemble.cases] or [[]])
     steps = np.concatenate([case.column("steps")[case.ok] for case in ensemble.cases] or [[]])
+    starts = read_starts(ensemble.directory / EVENTS_NAME)
+    spent, busy = rank_seconds(starts), float(np.nansum(seconds))
     return {
         "seconds": asdict(describe(seconds)),
-        "core_hours": float(np.nansum(seconds) / 3600.0),
+        "core_hours": busy / 3600.0,
         "steps": asdict(describe(steps)),
+        "starts": len(starts),
+        "rank_hours": spent / 3600.0,
+        "busy_share": min(1.0, busy / spent) if spent >= FEWEST_SECONDS else np.nan,
     }

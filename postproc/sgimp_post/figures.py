@@ -5,12 +5,13 @@ from __future__ import annotations
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
+from scipy import stats
 
 from .ensemble import RUNOUTS
-from .fits import LAWS, distribution_of, fit_laws
+from .fits import LAWS, best_fit, distribution_of, fit_laws
 from .importance import weighted_probability
 from .statistics import describe, exceedance, finite, running
-from .style import INK, LAW_STYLES, OTHER, acf_colour, colour, styled
+from .style import INK, LAW_STYLES, OTHER, colour, styled
 
 #: Values up to which each one has its tick below the histogram; a tick takes 230 bytes of SVG.
 MOST_TICKS = 200
@@ -19,24 +20,30 @@ MOST_TICKS = 200
 #: values close together would ask for millions.
 MOST_BINS = 100
 
+#: Order statistics drawn against the quantiles of the laws.
+MOST_QUANTILES = 80
+
 
 @styled
 def case_figure(case, name: str, deterministic: dict):
-    """Histogram with the four laws, running mean and standard deviation, exceedance."""
+    """Running mean and standard deviation, histogram with the four laws, quantiles against those
+    of the laws, exceedance."""
     values = case.values(name)
-    figure, axes = plt.subplots(1, 3, figsize=(11.5, 3.2))
-    _histogram(axes[0], values, colour(case), deterministic)
-    _running(axes[1], values, colour(case), deterministic)
-    _exceedance(axes[2], [case], name, deterministic)
-    for axis in (axes[0], axes[2]):
+    figure, axes = plt.subplots(2, 2, figsize=(9.6, 6.4))
+    (first, second), (third, fourth) = axes
+    fits = [fit for fit in fit_laws(values) if not fit.note]
+    _running(first, values, colour(case), deterministic)
+    _histogram(second, values, fits, colour(case), deterministic)
+    _quantiles(third, values, fits)
+    draw_exceedance(fourth, [case], name, deterministic)
+    for axis in (second, fourth):
         axis.set_xlabel(f"runout, {RUNOUTS[name]} [m]")
-    axes[0].set_title("Distribution")
-    axes[1].set_title("Convergence")
-    axes[2].set_title("Exceedance")
+    for axis, title in zip(axes.flat, ("Convergence", "Distribution", "Quantiles", "Exceedance")):
+        axis.set_title(title)
     return figure
 
 
-def _mark_deterministic(axis, deterministic: dict, vertical: bool = True):
+def mark_deterministic(axis, deterministic: dict, vertical: bool = True):
     """The homogeneous mean with the noise floor, mean +- one standard deviation, as a band."""
     mean, sd = deterministic["mean"], deterministic["sd"]
     if not np.isfinite(mean):
@@ -47,7 +54,7 @@ def _mark_deterministic(axis, deterministic: dict, vertical: bool = True):
         span(mean - sd, mean + sd, color=INK, alpha=0.10, lw=0, label="noise floor ±1 sd")
 
 
-def _histogram(axis, values, tint, deterministic):
+def _histogram(axis, values, fits, tint, deterministic):
     if len(values) == 0:
         axis.text(0.5, 0.5, "no values yet", ha="center", transform=axis.transAxes)
         return
@@ -56,23 +63,47 @@ def _histogram(axis, values, tint, deterministic):
     is_flat = np.ptp(values) <= 1e-12 * np.max(np.abs(values))
     bars = {"bins": 10, "range": (values.min() - margin, values.max() + margin)}
     if not is_flat:
-        bars = {"bins": _bin_count(values)}
+        bars = {"bins": bin_count(values)}
     axis.hist(values, **bars, density=True, color=tint, alpha=0.30, edgecolor="white")
     if len(values) <= MOST_TICKS:
         axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
     x = np.linspace(values.min() - margin, values.max() + margin, 300)
-    for fit in fit_laws(values):
-        if fit.note:
-            continue
+    for fit in fits:
         shade, dash = LAW_STYLES[fit.law]
         axis.plot(x, distribution_of(fit).pdf(x), color=shade, ls=dash, lw=1.4, label=LAWS[fit.law])
-    _mark_deterministic(axis, deterministic)
+    mark_deterministic(axis, deterministic)
     axis.set_ylabel("density [1/m]")
     if axis.get_legend_handles_labels()[0]:
         axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=3)
 
 
-def _bin_count(values) -> int:
+def _quantiles(axis, values, fits):
+    """Order statistics against the quantiles of each law at (k - 1/2)/n. The band is where 95 % of
+    samples of the law with the smallest AIC have each of them: its probability is Beta(k,
+    n - k + 1)."""
+    n = len(values)
+    rank = np.unique(np.linspace(1, n, min(n, MOST_QUANTILES)).round().astype(int))
+    observed = np.sort(values)[rank - 1]
+    best = best_fit(fits)
+    for fit in fits:
+        shade, dash = LAW_STYLES[fit.law]
+        x = distribution_of(fit).ppf((rank - 0.5) / n)
+        axis.plot(x, observed, color=shade, ls=dash, lw=1.4, label=LAWS[fit.law])
+        if fit is best:
+            low, high = (
+                distribution_of(fit).ppf(stats.beta.ppf(p, rank, n - rank + 1))
+                for p in (0.025, 0.975)
+            )
+            axis.fill_between(x, low, high, color=shade, alpha=0.12, lw=0, label="95 % of samples")
+    if fits:
+        ends = [observed[0], observed[-1]]
+        axis.plot(ends, ends, color=INK, lw=0.8)
+        axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=3)
+    axis.set_xlabel("quantile of the law [m]")
+    axis.set_ylabel("quantile of the members [m]")
+
+
+def bin_count(values) -> int:
     """By Freedman and Diaconis from 30 values on, within MOST_BINS."""
     if len(values) < 30:
         return max(3, min(10, len(values) // 2))
@@ -113,7 +144,7 @@ def _running(axis, values, tint, deterministic):
     )
 
 
-def _exceedance(axis, cases, name, deterministic):
+def draw_exceedance(axis, cases, name, deterministic):
     smallest = 1.0
     # Cases that differ in another key of the study than acf and cov: thinner and thinner lines.
     others = list(dict.fromkeys(str(case.varied) for case in cases))
@@ -141,84 +172,8 @@ def _exceedance(axis, cases, name, deterministic):
     axis.set_yscale("log")
     axis.set_ylim(0.5 * smallest, 1.3)
     axis.set_ylabel("P(runout > x), Wilson 95 %")
-    _mark_deterministic(axis, deterministic)
+    mark_deterministic(axis, deterministic)
     axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=2)
-
-
-@styled
-def comparison_figure(cases, name, deterministic):
-    """Exceedance of all cases in one axis."""
-    figure, axis = plt.subplots(figsize=(8.4, 4.2))
-    _exceedance(axis, cases, name, deterministic)
-    axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    axis.set_xlabel(f"runout, {RUNOUTS[name]} [m]")
-    return figure
-
-
-@styled
-def study_figure(summary: dict):
-    """Mean, standard deviation and exceedance probability against the coefficient of variation
-    (Figs. 13 and 14 of the paper), one line an autocorrelation function."""
-    name, floor = summary["primary"], summary["deterministic"][summary["primary"]]
-    figure, axes = plt.subplots(1, 3, figsize=(11.5, 3.3))
-    acfs = sorted({case["acf"] for case in summary["cases"]})
-    for k, acf in enumerate(acfs):
-        rows = sorted(
-            (case for case in summary["cases"] if case["acf"] == acf), key=lambda c: c["cov"]
-        )
-        x = np.array([row["cov"] for row in rows]) + 0.0012 * (k - 0.5 * (len(acfs) - 1))
-        for axis, value, low, high in (
-            (axes[0], "mean", "mean_low", "mean_high"),
-            (axes[1], "sd", "sd_low", "sd_high"),
-        ):
-            got = [row["runouts"][name] for row in rows]
-            y = np.array([row[value] for row in got])
-            span = [y - [row[low] for row in got], [row[high] for row in got] - y]
-            tint = acf_colour(acf)
-            axis.errorbar(
-                x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper()
-            )
-        shares = [row["exceedance"] for row in rows]
-        y = np.array([row["value"] for row in shares])
-        span = [y - [row["low"] for row in shares], [row["high"] for row in shares] - y]
-        tint = acf_colour(acf)
-        axes[2].errorbar(x, y, np.abs(span), color=tint, marker="o", ms=4, capsize=2, lw=1.3)
-    _mark_deterministic(axes[0], floor, vertical=False)
-    if np.isfinite(floor["sd"]):
-        axes[1].axhline(floor["sd"], color=INK, lw=1.1, ls=(0, (4, 2)), label="noise floor")
-    axes[0].set_ylabel(f"mean runout, {RUNOUTS[name]} [m]")
-    axes[1].set_ylabel("standard deviation [m]")
-    axes[1].set_ylim(bottom=0)
-    axes[2].set_ylabel("P(runout > homogeneous mean)")
-    axes[2].set_ylim(0, 1)
-    for axis in axes:
-        axis.set_xlabel("coefficient of variation")
-    axes[1].legend()
-    return figure
-
-
-@styled
-def soil_figure(summary: dict):
-    """Share of the variance that is soil, of each case by each definition of the runout."""
-    cases = summary["cases"]
-    figure, axes = plt.subplots(
-        1, len(RUNOUTS), figsize=(11.5, 0.9 + 0.22 * len(cases)), sharex=True, sharey=True
-    )
-    y = -np.arange(len(cases))
-    for axis, (name, words) in zip(axes, RUNOUTS.items()):
-        shares = [case["against_floor"][name]["soil_share"] for case in cases]
-        value, low, high = (
-            np.clip([share[key] for share in shares], 0.0, 1.0) for key in ("value", "low", "high")
-        )
-        tints = [acf_colour(case["acf"]) for case in cases]
-        axis.hlines(y, low, high, color=tints, lw=2.2, alpha=0.55)
-        axis.scatter(value, y, color=tints, s=18, zorder=3)
-        axis.set_title(words)
-        axis.set_xlabel("share of the variance")
-    axes[0].set_yticks(y, [case["label"] for case in cases])
-    axes[0].set_xlim(-0.02, 1.02)
-    axes[0].set_ylim(0.6 - len(cases), 0.6)
-    return figure
 
 
 @styled
@@ -240,7 +195,7 @@ def weighted_figure(cases, name: str, deterministic: dict):
     axis.set_yscale("log")
     axis.set_ylabel("P(runout > x), 95 %")
     axis.set_xlabel(f"runout, {RUNOUTS[name]} [m]")
-    _mark_deterministic(axis, deterministic)
+    mark_deterministic(axis, deterministic)
     axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import functools
 import io
+import re
 from pathlib import Path
 
 import matplotlib
@@ -58,7 +59,10 @@ STYLE = {
 }
 #: Forms in which every figure of a report is also written, for papers.
 FIGURE_KINDS = ("svg", "pdf")
-FONT = b"'DejaVu Sans'"
+_FONT = b"'DejaVu Sans'"
+_COMMENT = re.compile(rb" *<!--.*?-->\n", re.DOTALL)
+_PATH = re.compile(rb' d="([^"]*)"')
+_DIGITS = re.compile(rb"(\.\d\d)\d+")
 ACF_TEXTS = {"matern32": "Matérn 3/2", "matern52": "Matérn 5/2", "matern": "Matérn"}
 PROPERTY_TEXTS = {
     "friction_angle": "friction angle",
@@ -105,9 +109,15 @@ def rendered(figure, kind: str = "svg", dpi: int = 130) -> bytes:
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=undated.get(kind))
-    content = buffer.getvalue()
-    # Where there is no DejaVu: its relative of the same widths, or whatever there is.
-    return content.replace(FONT, FONT + b", Verdana, sans-serif") if kind == "svg" else content
+    return _slim(buffer.getvalue()) if kind == "svg" else buffer.getvalue()
+
+
+def _slim(svg: bytes) -> bytes:
+    """Half the size for the same picture: paths to 0.01 pt, no comments. Where there is no DejaVu,
+    text is set in its relative of the same widths, or in whatever there is."""
+    svg = _COMMENT.sub(b"", svg)
+    svg = _PATH.sub(lambda d: b' d="' + b" ".join(_DIGITS.sub(rb"\1", d[1]).split()) + b'"', svg)
+    return svg.replace(_FONT, _FONT + b", Verdana, sans-serif")
 
 
 class Gallery:

@@ -2,51 +2,23 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 import sys
 import time
-from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 
 from .ensemble import FILE_NAME, RUNOUTS, Ensemble, read_ensemble
 from .errors import PostError
+from .events import EVENTS_NAME, Progress, age, read_starts
 from .importance import weighted_mean, weighted_sd
 from .statistics import describe
 
-EVENTS_NAME = "events.jsonl"
 #: Seconds without an event from which on it is told.
 SILENCE = 120.0
 _CLEAR = "\x1b[H\x1b[2J"
-_TIME = "%Y-%m-%dT%H:%M:%SZ"
 _EXIT_TOO_MANY_FAILED = 4
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Of the last start of a run, as its events tell. `state`: running, complete or stopped;
-    `expected`: members needed in the end where stop rules may end cases; `eta`, `seconds` in s, NaN
-    if not known; `last`: time of the last event."""
-
-    state: str
-    done: int
-    total: int
-    expected: int
-    failed: int
-    first_done: int = 0
-    ranks: int = 0
-    seconds: float = math.nan
-    eta: float = math.nan
-    exit_code: int = 0
-    last: str = ""
-
-    @property
-    def rate(self) -> float:
-        """Members a minute since the start; NaN before the first."""
-        fresh = self.done - self.first_done
-        return 60.0 * fresh / self.seconds if fresh > 0 and self.seconds > 0.0 else math.nan
 
 
 def run(options) -> int:
@@ -80,69 +52,19 @@ def watch(directory: Path, interval: float, once: bool, runout: str, out=None, p
 
 def look(directory: Path, runout: str, now: datetime | None = None):
     """(whether the run has ended, lines that say where it stands)."""
-    progress = read_progress(directory / EVENTS_NAME)
+    starts = read_starts(directory / EVENTS_NAME)
+    progress = starts[-1] if starts else None
     # Results are not there from the first moment on.
     is_early = progress is not None and not (directory / FILE_NAME).exists()
     ensemble = None if is_early else read_ensemble(directory)
     if progress is None:
         progress = _from_results(ensemble)
     lines = [f"{directory}: {_headline(progress)}"]
-    silent = _age(progress, now or datetime.now(timezone.utc))
+    silent = age(progress, now or datetime.now(timezone.utc))
     if progress.state == "running" and silent > SILENCE:
         lines.append(f"no event for {duration(silent)}: members are slow, or the run was killed")
     lines += ["no results yet"] if ensemble is None else _table(ensemble, runout)
     return progress.state != "running", lines
-
-
-def read_progress(path: Path) -> Progress | None:
-    """From the events since the last start; None if there are none. A line that is not whole, as
-    the last one of a running sweep may be, is passed over."""
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except FileNotFoundError:
-        return None
-    except OSError as cause:
-        raise PostError(f"{path}: cannot be read ({cause.strerror})") from cause
-    found = None
-    for line in text.splitlines():
-        try:
-            event = json.loads(line)
-            found = _after(found, event)
-        except (ValueError, KeyError, TypeError, AttributeError):
-            continue
-    return found
-
-
-def _after(found: Progress | None, event: dict) -> Progress | None:
-    kind, done = event["event"], int(event.get("done", 0))
-    if kind == "start":
-        total = int(event["members"])
-        failed = found.failed if found else 0
-        return Progress(
-            "running", done, total, total, failed, done, int(event["ranks"]), last=event["time"]
-        )
-    if found is None:
-        return None
-    if kind == "progress":
-        eta = event["eta_seconds"]
-        found = replace(
-            found,
-            done=done,
-            total=int(event["total"]),
-            expected=int(event["expected"]),
-            failed=int(event["failed"]),
-            seconds=float(event["seconds"]),
-            eta=math.nan if eta is None else float(eta),
-        )
-    elif kind == "end":
-        found = replace(
-            found,
-            state=str(event["state"]),
-            done=done,
-            failed=int(event["failed"]),
-            exit_code=int(event["exit_code"]),
-        )
-    return replace(found, last=event["time"])
 
 
 def _from_results(ensemble: Ensemble) -> Progress:
@@ -171,15 +93,6 @@ def _headline(progress: Progress) -> str:
     if progress.expected < progress.total:
         text += f", about {progress.expected - progress.done} more needed"
     return text + (f", ETA {duration(progress.eta)}" if math.isfinite(progress.eta) else "")
-
-
-def _age(progress: Progress, now: datetime) -> float:
-    """Seconds since the last event; NaN if its time is not known."""
-    try:
-        last = datetime.strptime(progress.last, _TIME).replace(tzinfo=timezone.utc)
-    except ValueError:
-        return math.nan
-    return (now - last).total_seconds()
 
 
 def duration(seconds: float) -> str:

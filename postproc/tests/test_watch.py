@@ -10,8 +10,9 @@ from synthetic import sample, write_ensemble
 
 from sgimp_post import watch as watching
 from sgimp_post.cli import main
+from sgimp_post.events import rank_seconds, read_starts
 from sgimp_post.importance import weighted_mean
-from sgimp_post.watch import duration, look, read_progress, watch
+from sgimp_post.watch import duration, look, watch
 
 NOON = datetime(2026, 1, 1, 12, 0, 0, tzinfo=timezone.utc)
 VALUES = sample(1, 40)
@@ -69,8 +70,17 @@ def test_a_running_sweep_in_numbers(tmp_path):
 
 def test_a_half_written_line_and_foreign_ones_are_passed_over(tmp_path):
     write_events(tmp_path, start(), progress(12), tail='[1]\n{"x":1}\n{"time":"2026-01-01T12:0')
-    got = read_progress(tmp_path / "events.jsonl")
+    got = read_starts(tmp_path / "events.jsonl")[-1]
     assert (got.state, got.done, got.rate) == ("running", 12, 12.0)
+
+
+def test_time_of_all_ranks_over_all_starts(tmp_path):
+    """Two ranks for a minute, then four for half of one; what followed a kill has no end."""
+    first = [start(), {**end(20, "stopped", 3), "time": "2026-01-01T12:01:00Z"}]
+    second = [start(20, ranks=4), {**progress(30), "time": "2026-01-01T12:00:30Z"}]
+    write_events(tmp_path, *first, *second)
+    assert rank_seconds(read_starts(tmp_path / "events.jsonl")) == 2 * 60 + 4 * 30
+    assert np.isnan(rank_seconds(read_starts(tmp_path / "none.jsonl")))
 
 
 def test_a_sweep_that_was_resumed_runs_again(tmp_path):
