@@ -121,6 +121,47 @@ def audit(fields, members: int) -> dict:
     }
 
 
+def audit_rows(numbers: dict) -> list:
+    """Of what `audit` gives, a row a case and field: members, mean and standard deviation with
+    their expected values in the unit of the field, share of clipped values, how many checks lie in
+    their band (as '21/25'), and how the field was made."""
+    checks = {}
+    for check in numbers["checks"]:
+        checks.setdefault((check.case, check.field), []).append(check)
+    rows = []
+    for entry in numbers["fields"]:
+        mine = checks[entry["case"], entry["field"]]
+        mean, sd = (next(c for c in mine if c.kind == kind) for kind in ("mean", "sd"))
+        method = entry["method"]
+        if entry["ring"]:
+            method += f" {entry['ring'][0]} x {entry['ring'][1]}"
+        if any(entry["jitter"]):
+            method += f", jitter {max(entry['jitter']):.0e}"
+        rows.append(
+            {
+                "case": entry["case"],
+                "field": entry["field"],
+                "members": entry["members"],
+                "mean": mean.value,
+                "mean_target": mean.expected,
+                "sd": sd.value,
+                "sd_target": sd.expected,
+                "clipped": entry["clipped"],
+                "inside": f"{sum(c.inside for c in mine)}/{len(mine)}",
+                "method": method,
+            }
+        )
+    return rows
+
+
+def one_of_each_acf(entries) -> list:
+    """The first entry of each autocorrelation function."""
+    first = {}
+    for entry in entries:
+        first.setdefault(entry["acf"], entry)
+    return list(first.values())
+
+
 def _units(fields, estimates):
     """One number a unit that is independent of the others, from one a member."""
     x = np.asarray(estimates, dtype=float)

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from . import field_figures
 from .errors import PostError
-from .field_audit import audit
+from .field_audit import audit, audit_rows, one_of_each_acf
 from .random_fields import read_random_fields
 from .snapshots import find_snapshots
 from .style import Gallery
@@ -83,22 +83,12 @@ def _table(numbers):
         f"{'case':<{width}} {'field':<18} {'N':>5} {'mean':>11} {'target':>11} {'sd':>10}"
         f" {'target':>10} {'clipped':>9} {'inside':>9}  method"
     )
-    checks = {}
-    for check in numbers["checks"]:
-        checks.setdefault((check.case, check.field), []).append(check)
-    for entry in numbers["fields"]:
-        mine = checks[entry["case"], entry["field"]]
-        mean, sd = (next(c for c in mine if c.kind == kind) for kind in ("mean", "sd"))
-        method = entry["method"]
-        if entry["ring"]:
-            method += f" {entry['ring'][0]} x {entry['ring'][1]}"
-        if any(entry["jitter"]):
-            method += f", jitter {max(entry['jitter']):.0e}"
-        inside = f"{sum(c.inside for c in mine)}/{len(mine)}"
+    for row in audit_rows(numbers):
         yield (
-            f"{entry['case']:<{width}} {entry['field']:<18} {entry['members']:>5}"
-            f" {mean.value:>11.5g} {mean.expected:>11.5g} {sd.value:>10.4g} {sd.expected:>10.4g}"
-            f" {entry['clipped']:>9.2e} {inside:>9}  {method}"
+            f"{row['case']:<{width}} {row['field']:<18} {row['members']:>5}"
+            f" {row['mean']:>11.5g} {row['mean_target']:>11.5g} {row['sd']:>10.4g}"
+            f" {row['sd_target']:>10.4g} {row['clipped']:>9.2e}"
+            f" {row['inside']:>9}  {row['method']}"
         )
     yield from numbers["notes"]
 
@@ -108,12 +98,10 @@ def _draw(fields, numbers, directory) -> None:
         entries = [entry for entry in numbers["fields"] if entry["field"] == spec.name]
         if not entries:
             continue
-        by_acf = {}
-        for entry in entries:
-            by_acf.setdefault(entry["acf"], entry)
+        by_acf = one_of_each_acf(entries)
         cases = {case.label: case for case in fields.cases}
         rows = []
-        for entry in by_acf.values():
+        for entry in by_acf:
             case = cases[entry["case"]]
             ids = np.arange(1, min(field_figures.SHOWN_MEMBERS, entry["members"]) + 1)
             rows.append((case, entry["acf"], fields.values(case, ids)[spec.name]))
@@ -122,7 +110,7 @@ def _draw(fields, numbers, directory) -> None:
             "quantiles": field_figures.quantile_figure(spec, entries),
         }
         if any(curve["lag"] for entry in entries for curve in entry["correlation"]):
-            drawn["correlation"] = field_figures.correlation_figure(list(by_acf.values()))
+            drawn["correlation"] = field_figures.correlation_figure(by_acf)
         gallery = Gallery()
         for kind, figure in drawn.items():
             gallery.add(f"{kind}_{_file_name(spec.name)}", figure)

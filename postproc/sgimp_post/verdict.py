@@ -181,7 +181,7 @@ def warnings(summary: dict) -> list:
     if inside:
         found.append(
             "The mean differs from homogeneous ground by less than the noise floor in: "
-            + ", ".join(inside)
+            + _named(inside, summary)
             + ". Such a difference is not a finding."
         )
     pairs = [pair for pair in summary["pairs"] if pair["n"] and pair["by"] == "acf"]
@@ -193,9 +193,8 @@ def warnings(summary: dict) -> list:
         )
     noisy = [case for case in summary["cases"] if case["noise_share"] > 0.5]
     if noisy:
-        line = (
-            "More than half of the variance of the runout is discretisation noise in: "
-            + ", ".join(case["label"] for case in noisy)
+        line = "More than half of the variance of the runout is discretisation noise in: " + _named(
+            [case["label"] for case in noisy], summary
         )
         floors = [summary["floors"].get(case["noise_case"]) for case in noisy]
         if all(floor and floor[name]["nominal_is_outlier"] for floor in floors):
@@ -206,3 +205,9 @@ def warnings(summary: dict) -> list:
             line += f". Without the nominal homogeneous run it is at most {100.0 * share:.0f} %"
         found.append(line + ".")
     return found
+
+
+def _named(labels: list, summary: dict) -> str:
+    """These cases; in one phrase if they are all."""
+    count = len(summary["cases"])
+    return f"all {count} cases" if len(labels) == count > 3 else ", ".join(labels)
