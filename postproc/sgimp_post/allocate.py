@@ -10,7 +10,7 @@ from .analysis import analyse
 from .control_variates import FEWEST, allocate_for_cost, allocate_for_half_width
 from .ensemble import RUNOUTS, read_ensemble
 from .errors import PostError
-from .statistics import CONFIDENCE, _z
+from .statistics import CONFIDENCE, _z, correlation_interval
 
 #: Of one case, as the program has it.
 MOST_MEMBERS = 1e9
@@ -56,7 +56,7 @@ def _lines(pilots: list, options):
     for entry in pilots:
         n, twins, plain = _numbers(entry, options, len(pilots))
         pairs = next(r["n"] for r in entry["rows"] if r["control"] == "twin")
-        low, high = _correlation_interval(entry["correlation"], pairs)
+        low, high = correlation_interval(entry["correlation"], pairs)
         r = f"{entry['correlation']:.3f} ({low:.3f}, {high:.3f})"
         yield (
             f"{entry['case']:<24} {pairs:>6} {r:>21} {entry['cost_ratio']:>7.2f}"
@@ -100,9 +100,3 @@ def _numbers(entry, options, cases: int):
             raise PostError(f"--hours does not pay for {FEWEST + 1} members of each case")
         return n, twins, int(plain)
     return 0, 0, 0
-
-
-def _correlation_interval(r: float, n: int):
-    """Fisher's: tanh(artanh(r) +- z/sqrt(n - 3))."""
-    middle, half = np.arctanh(min(r, 1.0 - 1e-12)), _z(CONFIDENCE) / np.sqrt(n - 3.0)
-    return float(np.tanh(middle - half)), float(np.tanh(middle + half))

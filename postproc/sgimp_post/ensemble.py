@@ -213,6 +213,17 @@ class Ensemble:
         return cases if asked is None else [case.select(np.isin(case.id, asked)) for case in cases]
 
 
+def most_variable(cases: list, most: int) -> list:
+    """Of each autocorrelation function the first case of the largest cov, `most` in all: where the
+    soil varies most, it shows most."""
+    strongest = {}
+    for case in cases:
+        known = strongest.get(case.acf)
+        if known is None or case.cov > known.cov:
+            strongest[case.acf] = case
+    return list(strongest.values())[:most]
+
+
 def read_ensemble(directory: Path) -> Ensemble:
     """Reads DIR/ensemble.h5. Raises PostError, naming the file, on anything that is not one."""
     directory = Path(directory)

@@ -312,6 +312,28 @@ def holm(p_values) -> np.ndarray:
     return adjusted
 
 
+def benjamini_hochberg(p_values) -> np.ndarray:
+    """p values adjusted so that of those up to a level, that share at most is false on average
+    (Benjamini and Hochberg 1995); NaN stays and is not counted."""
+    p = np.asarray(p_values, dtype=float)
+    adjusted = np.full(p.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(p))
+    ranked = known[np.argsort(p[known], kind="stable")]
+    factors = len(ranked) / np.arange(1.0, len(ranked) + 1.0)
+    least = np.minimum.accumulate((factors * p[ranked])[::-1])[::-1]
+    adjusted[ranked] = np.minimum(1.0, least)
+    return adjusted
+
+
+def correlation_interval(r: float, n: int, confidence: float = CONFIDENCE):
+    """Fisher's: tanh(artanh(r) +- z/sqrt(n - 3)); NaN for three pairs or fewer."""
+    if n < 4:
+        return np.nan, np.nan
+    middle, half = np.arctanh(np.clip(r, -1.0 + 1e-12, 1.0 - 1e-12)), _z(confidence)
+    half /= np.sqrt(n - 3.0)
+    return float(np.tanh(middle - half)), float(np.tanh(middle + half))
+
+
 def running(values, confidence: float = CONFIDENCE, points: int = 240) -> Running:
     """At most `points` counts, evenly spread; always the first two and the last."""
     x = finite(values)
