@@ -100,7 +100,10 @@ def _draw_curve(axis, entry, one, tint, dash, text, with_band=True):
         axis.fill_between(entry.x[shown], low, high, color=tint, alpha=0.18, lw=0)
     # Zero has no logarithm: a gap.
     p = np.where(drawn, one.probability, np.nan)[shown]
-    axis.plot(entry.x[shown], p, color=tint, ls=dash, marker=".", ms=3, lw=1.4, label=text)
+    axis.plot(
+        entry.x[shown], p, color=tint, ls=dash, lw=1.4, label=text, marker=".", ms=3.5,
+        markevery=np.flatnonzero(p < 1.0).tolist(),
+    )  # fmt: skip
 
 
 def _finish_curves(axis, found):

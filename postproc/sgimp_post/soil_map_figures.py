@@ -58,7 +58,7 @@ def soil_map_figure(one, limit: float):
     colours = matplotlib.cm.ScalarMappable(scale, COLOURS)
     bar = figure.colorbar(
         colours, ax=list(axes), label=f"correlation with {name} [–]", pad=0.015, fraction=0.03,
-        aspect=25,
+        aspect=25, shrink=0.85,
     )  # fmt: skip
     bar.outline.set_edgecolor("#8795A1")
     return figure
