@@ -177,11 +177,13 @@ def weighted_distance(fronts, log_weights, probability: float) -> Distance:
     and upper bounds of P(front >= d) pass `probability`; told where that is supported."""
     ends = np.unique(fronts[np.isfinite(fronts)])
     rows = [_weighted(fronts >= end, log_weights) for end in ends]
-    found = [[end for end, row in zip(ends, rows) if row[k] >= probability] for k in range(3)]
-    value, low, high = (float(max(told)) if told else np.nan for told in found)
-    # Beyond a front that is not supported the upper bound is not known.
-    is_known = any(row[2] < probability for row in rows)
-    return Distance(probability, value, low, high if is_known else np.nan)
+    found = []
+    for k in range(3):
+        reached = [end for end, row in zip(ends, rows) if row[k] >= probability]
+        # Where all that is told is reached, what is farther may be as well; a lower end stays one.
+        is_passed = k == 1 or any(row[k] < probability for row in rows)
+        found.append(float(max(reached)) if reached and is_passed else np.nan)
+    return Distance(probability, *found)
 
 
 def _weighted(is_true, log_weights) -> tuple:

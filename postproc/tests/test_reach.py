@@ -176,6 +176,14 @@ def test_weighted_distances_hold():
     assert held / 200 >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / 200)
 
 
+def test_weighted_members_that_do_not_go_so_far_give_a_lower_end_alone():
+    x = np.round(np.random.default_rng(17).normal(2.0, 1.0, 400), 1)
+    got = weighted_distance(x, 2.0 - 2.0 * x, 1e-9)
+    assert np.isnan([got.value, got.high]).all() and got.low > 3.0
+    got = weighted_distance(x, 2.0 - 2.0 * x, 0.999)
+    assert np.isnan([got.value, got.low]).all()
+
+
 def test_homogeneous_ground_alone_is_told_of(tmp_path):
     write_ensemble(tmp_path / "h", [{"label": "deterministic", "values": np.full(8, 5.0)}])
     (got,) = reaches(read_ensemble(tmp_path / "h"))
