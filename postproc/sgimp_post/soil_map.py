@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
+from scipy.spatial import cKDTree
 
 from .ensemble import RUNOUTS, most_variable
 from .errors import PostError
 from .random_fields import read_random_fields
+from .samplers import Points
 from .statistics import CONFIDENCE, _t_factor, benjamini_hochberg, correlation_interval
 from .two_level import MOST_DENSE, SAME
 
@@ -36,6 +38,8 @@ EXCHANGES = 199
 _MOST_PROBES = 10_000
 #: Values of a field that are held at once: 32 MiB.
 _MOST_VALUES = 2**22
+#: Points closer than this share of the extent of a field are the same, as in the audit.
+_SAME_PLACE = 1e-7
 #: A variance below this (of 1) is rounding: the field is known there, from a measurement.
 _NO_VARIANCE = 1e-9
 
@@ -112,6 +116,8 @@ class SoilMap:
     cov: float
     spec: object
     n: int
+    #: Points that have the property from this field.
+    body: Points
     points: CorrelationMap
     blocks: Blocks
     block_map: CorrelationMap
@@ -167,20 +173,43 @@ def _maps_of(fields, case, name) -> list:
         np.ptp(runout[half]) == 0.0 for half in (halves, ~halves)
     ):
         raise PostError("too few members of odd or even id that differ")
-    blocks = {spec.name: divide(spec.points) for spec in specs}
-    sums = {spec.name: _HalfSums.of(runout, halves, spec.points.count) for spec in specs}
-    means = {spec.name: [] for spec in specs}
+    kept = {spec.name: _where_it_counts(fields, spec) for spec in specs}
+    specs = [spec for spec in specs if kept[spec.name].any()]
+    if not specs:
+        raise PostError("imported fields cover all others")
+    bodies = {spec.name: _part(spec.points, kept[spec.name]) for spec in specs}
+    blocks = {key: divide(body) for key, body in bodies.items()}
+    sums = {key: _HalfSums.of(runout, halves, body.count) for key, body in bodies.items()}
+    means = {key: [] for key in bodies}
     most = max(1, _MOST_VALUES // max(spec.points.count for spec in specs))
     for first in range(0, known.count, most):
         rows = slice(first, first + most)
-        for key, values in fields.conditioned(known, known.id[rows]).items():
+        fresh = fields.conditioned(known, known.id[rows])
+        for key in bodies:
+            values = fresh[key][:, kept[key]]
             sums[key].add(values, rows)
             means[key].append(block_means(values, blocks[key]))
     return [
-        _finished(known, spec, runout, halves, sums[spec.name], blocks[spec.name],
-                  np.concatenate(means[spec.name]))
+        _finished(known, spec, bodies[spec.name], runout, halves, sums[spec.name],
+                  blocks[spec.name], np.concatenate(means[spec.name]))
         for spec in specs
     ]  # fmt: skip
+
+
+def _where_it_counts(fields, spec) -> np.ndarray:
+    """Mask of its points: where several fields of a property cover a point, the last one counts."""
+    free = np.ones(spec.points.count, dtype=bool)
+    places = np.column_stack([spec.points.x, spec.points.y])
+    near = _SAME_PLACE * max(np.ptp(places), 1e-300)
+    for later in fields.specs[spec.index :]:
+        if later.property.replace("tan_", "") == spec.property.replace("tan_", ""):
+            tree = cKDTree(np.column_stack([later.points.x, later.points.y]))
+            free &= tree.query(places)[0] > near
+    return free
+
+
+def _part(points, kept) -> Points:
+    return Points(*(column[kept] for column in (points.x, points.y, points.width, points.height)))
 
 
 def _check_rebuilt(fields, case) -> None:
@@ -193,20 +222,21 @@ def _check_rebuilt(fields, case) -> None:
         raise PostError("the field that is rebuilt is not the one on record")
 
 
-def _finished(case, spec, runout, halves, sums, blocks, means) -> SoilMap:
+def _finished(case, spec, body, runout, halves, sums, blocks, means) -> SoilMap:
     block_sums = _HalfSums.of(runout, halves, means.shape[1])
     block_sums.add(means, slice(None))
     size = np.bincount(blocks.owner)
     mean = means @ size / size.sum()
     r = float(np.corrcoef(mean, runout)[0, 1])
-    centre = [np.bincount(blocks.owner, weights=at) / size for at in (spec.points.x, spec.points.y)]
+    centre = [np.bincount(blocks.owner, weights=at) / size for at in (body.x, body.y)]
     return SoilMap(
         case.label,
         case.acf,
         case.cov,
         spec,
         case.count,
-        sums.finished(spec.points.x, spec.points.y),
+        body,
+        sums.finished(body.x, body.y),
         blocks,
         block_sums.finished(*centre),
         Place(np.nan, np.nan, r, *correlation_interval(r, case.count)),

@@ -17,6 +17,8 @@ COLOURS = "PuOr"
 _GREY = "#D9DFE3"
 #: Share of grey in the colour of a point that is not marked.
 _VEIL = 0.75
+#: Columns of blocks at most for a number in each.
+_MOST_NUMBERED = 8
 
 
 def shared_limit(maps: list) -> float:
@@ -32,20 +34,21 @@ def shared_limit(maps: list) -> float:
 @styled
 def soil_map_figure(one, limit: float):
     """Points, blocks, and the blocks of either half of the members, on the scale +- `limit`."""
-    left, right, bottom, top = _box(one.spec.points)
+    left, right, bottom, top = _box(one.body)
     aspect = (top - bottom) / (right - left)
     figure, axes = plt.subplots(
         1,
         4,
-        figsize=(11.5, 0.95 + 3.1 * min(max(aspect, 0.25), 1.6)),
+        figsize=(11.5, 0.95 + 3.1 * min(max(aspect, 0.4), 1.6)),
         gridspec_kw={"width_ratios": [1.0, 1.0, 0.6, 0.6]},
     )
     scale = Normalize(-limit, limit)
-    _draw_points(axes[0], one.spec.points, one.points, scale)
+    _draw_points(axes[0], one.body, one.points, scale)
     _draw_blocks(axes[1], one.blocks, one.block_map.correlation, scale, one.block_map.marked)
     _draw_blocks(axes[2], one.blocks, one.block_map.odd, scale)
     _draw_blocks(axes[3], one.blocks, one.block_map.even, scale)
-    titles = "points", "means of blocks", "odd ids", "even ids"
+    name = PROPERTY_TEXTS.get(one.spec.property, one.spec.property)
+    titles = f"{name} at points", "means of blocks", "odd ids", "even ids"
     for axis, title in zip(axes, titles):
         axis.set_title(title)
         axis.grid(False)
@@ -54,10 +57,9 @@ def soil_map_figure(one, limit: float):
         axis.set_ylim(bottom, top)
         axis.set_xlabel("x [m]")
     axes[0].set_ylabel("y [m]")
-    name = PROPERTY_TEXTS.get(one.spec.property, one.spec.property)
     colours = matplotlib.cm.ScalarMappable(scale, COLOURS)
     bar = figure.colorbar(
-        colours, ax=list(axes), label=f"correlation with {name} [–]", pad=0.015, fraction=0.03,
+        colours, ax=list(axes), label="correlation with runout [–]", pad=0.015, fraction=0.03,
         aspect=25, shrink=0.85,
     )  # fmt: skip
     bar.outline.set_edgecolor("#8795A1")
@@ -82,8 +84,9 @@ def _draw_points(axis, points, found, scale):
 
 
 def _draw_blocks(axis, blocks, correlation, scale, marked=None):
-    """Blocks that are not marked, where that is known, are hatched."""
+    """Blocks that are not marked, where that is known, are hatched; others have their number."""
     colours = matplotlib.colormaps[COLOURS]
+    has_numbers = marked is not None and len(blocks.x_edges) - 1 <= _MOST_NUMBERED
     for k, (column, row) in enumerate(blocks.place):
         x, y = blocks.x_edges[column : column + 2], blocks.y_edges[row : row + 2]
         is_hatched = marked is not None and not marked[k]
@@ -93,9 +96,9 @@ def _draw_blocks(axis, blocks, correlation, scale, marked=None):
                 ec="#B4BEC6" if is_hatched else "white", lw=0.4, hatch="////" if is_hatched else "",
             )
         )  # fmt: skip
-        if marked is not None and marked[k]:
+        if has_numbers and marked[k]:
             axis.text(
                 x.mean(), y.mean(), f"{correlation[k]:.2f}".replace("-", "−"),
-                ha="center", va="center", fontsize=8,
+                ha="center", va="center", fontsize=7.5,
                 color="white" if abs(correlation[k]) > 0.75 * scale.vmax else INK,
             )  # fmt: skip

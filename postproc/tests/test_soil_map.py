@@ -258,6 +258,20 @@ def test_a_run_gives_the_map_of_its_rebuilt_fields(tmp_path):
     assert rows["soil_map_summary.csv"][0]["points"] == 100
 
 
+def test_where_a_later_field_covers_a_point_it_alone_counts(tmp_path):
+    x, y = lattice_points(10, 10)
+    seam = (y > 0.5) & (y < 1.0)
+    fields = [FIELD, {**FIELD, "name": "seam"}]
+    write_run(tmp_path / "r", fields, [(x, y), (x[seam], y[seam])], members=50)
+    with h5py.File(tmp_path / "r" / "ensemble.h5", "r+") as file:
+        file["cases/snx_cov0.10/runout_max"][...] = np.random.default_rng(1).gumbel(size=50)
+    maps, notes = soil_maps(read_ensemble(tmp_path / "r"), "runout_max")
+    assert notes == [] and [one.spec.name for one in maps] == ["friction_angle", "seam"]
+    assert np.array_equal(np.column_stack([maps[0].points.x, maps[0].points.y]),
+                          np.column_stack([x, y])[~seam])  # fmt: skip
+    assert len(maps[1].points.x) == seam.sum()
+
+
 def test_failed_members_and_unknown_runouts_do_not_count(tmp_path):
     z = write_study(tmp_path / "r", members=80)
     with h5py.File(tmp_path / "r" / "ensemble.h5", "r+") as file:
@@ -326,7 +340,12 @@ def test_picture_and_page_show_the_map(tmp_path):
     largest = np.abs(np.r_[maps[0].points.correlation, maps[0].block_map.correlation]).max()
     assert largest <= limit <= largest + 0.1
     svg = rendered(soil_map_figures.soil_map_figure(maps[0], limit)).decode()
-    assert "correlation with friction angle [–]" in svg and "y [m]" in svg and len(svg) < 150_000
+    assert (
+        "friction angle at points" in svg
+        and "correlation with runout [–]" in svg
+        and "y [m]" in svg
+        and len(svg) < 150_000
+    )
     environment = _environment()
     environment.undefined = jinja2.StrictUndefined
     page = environment.get_template("soil_map.html.j2")
