@@ -12,7 +12,8 @@ from .errors import PostError
 
 
 def main(arguments=None) -> int:
-    """Exit codes: 0; 1 for fields that are not what they should be; 2 for bad input."""
+    """Exit codes: 0; 1 for fields that are not what they should be or a replay that fails; 2 for
+    bad input."""
     parser = argparse.ArgumentParser(prog="sgimp-post", description=__doc__.splitlines()[0])
     parser.add_argument("--version", action="version", version=f"sgimp-post {__version__}")
     commands = parser.add_subparsers(dest="command", required=True)
@@ -24,6 +25,7 @@ def main(arguments=None) -> int:
     _add_diff(commands)
     _add_watch(commands)
     _add_export(commands)
+    _add_casebook(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
@@ -224,5 +226,33 @@ def _add_export(commands):
 
 def _export(options) -> int:
     from .export import run
+
+    return run(options)
+
+
+def _add_casebook(commands):
+    casebook = commands.add_parser(
+        "casebook",
+        help="members at the quantiles of the runout computed again, as animations and stills",
+    )
+    casebook.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    casebook.add_argument(
+        "--study-case", metavar="LABEL", help="this one alone (default a handful of study cases)"
+    )
+    _add_runout(casebook, "whose quantiles are meant")
+    casebook.add_argument(
+        "--sgimp", metavar="PROGRAM", help="the program (default: the one built here, or on PATH)"
+    )
+    casebook.add_argument(
+        "--frames", type=int, metavar="N", help="frames of an animation (default 40)"
+    )
+    casebook.add_argument(
+        "--out", type=Path, metavar="DIR2", help="where all of it goes (default DIR/casebook)"
+    )
+    casebook.set_defaults(run=_casebook)
+
+
+def _casebook(options) -> int:
+    from .casebook import run
 
     return run(options)
