@@ -12,14 +12,14 @@ import numpy as np
 
 from . import __version__
 from .casebook_figures import animate, shared_view, still_figure
-from .casebook_frames import frame_steps, frame_times, shared_quantities, survey
+from .casebook_frames import Track, frame_steps, frame_times, shared_quantities, survey
 from .ensemble import RUNOUTS, read_ensemble
 from .errors import PostError
 from .member_section import member_entries
 from .member_states import CASEBOOK, varied_property
 from .namelist import read_namelist, resolved_text
-from .quantile_members import quantile_members, shown_cases
-from .replays import Replay, find_program, program_version, replay, replay_case
+from .quantile_members import QuantileMember, quantile_members, shown_cases
+from .replays import Replay, find_program, replay, replay_case
 from .report import _environment, _field_unit
 from .snapshots import read_point_states
 from .style import FIGURE_KINDS, Gallery, rendered
@@ -34,14 +34,17 @@ class Exhibit:
     """A member of a case with its replay, and the names of its pictures in the casebook; `problem`
     is empty, or says why there are none."""
 
-    name: str
-    row: dict
+    member: QuantileMember
     replay: Replay
-    track: object = None
+    track: Track | None = None
     problem: str = ""
     gif: str = ""
     still: str = ""
     files: list = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return f"{self.member.name}: member {self.member.id}, {self.member.value:.3f} m"
 
     @property
     def verdict(self) -> str:
@@ -71,7 +74,6 @@ def run(options) -> int:
         print(f"{options.directory}: no member has ended well yet: there is nothing to show")
         return 0
     program = find_program(options.sgimp)
-    version = program_version(program)
     out = Path(options.out) if options.out else Path(options.directory) / CASEBOOK
     gallery, chapters = Gallery(), []
     try:
@@ -79,8 +81,6 @@ def run(options) -> int:
         for case in cases:
             exhibits = _replay(ensemble, case, members[case.label], program, frames, out)
             (entry,) = member_entries(ensemble, options.runout, gallery, case.label, out)
-            for exhibit, row in zip(exhibits, entry["rows"]):
-                exhibit.row = row
             _draw(case, exhibits, frames, out)
             chapters.append({**entry, "exhibits": exhibits})
         gallery.write(out)
@@ -91,13 +91,14 @@ def run(options) -> int:
             .render(
                 chapters=chapters,
                 directory=Path(options.directory).resolve(),
+                out=out,
                 runout=RUNOUTS[options.runout],
                 state=ensemble.state,
                 total=sum(case.role == "study" for case in ensemble.cases),
                 frames=frames,
                 recorded=f"sgimp {ensemble.attributes.get('version', '')}"
                 f" ({ensemble.attributes.get('git_hash', '')})",
-                replayed=version,
+                replayed=program.version,
                 field_unit=_field_unit(ensemble),
                 post_version=__version__,
             ),
@@ -111,12 +112,11 @@ def run(options) -> int:
 
 def _replay(ensemble, case, members, program, frames: int, out: Path) -> list:
     """An Exhibit of each member, and a line about it on the terminal."""
-    text = replay_case(ensemble, _interval(ensemble, case, members, frames))
+    text = replay_case(ensemble, program, _interval(ensemble, case, members, frames))
     varied, exhibits = varied_property(ensemble), []
     for member in members:
         done = replay(program, text, case, member.id, out)
-        one = Exhibit(f"{member.name}: member {member.id}, {member.value:.3f} m", {}, done)
-        one.problem = done.problem
+        one = Exhibit(member, done, problem=done.problem)
         if not one.problem:
             try:
                 one.track = survey(done.path, varied)
@@ -153,7 +153,7 @@ def _draw(case, exhibits, frames: int, out: Path) -> None:
     view = shared_view(tracks, shared_quantities(tracks), case.geometry)
     times = frame_times(tracks, frames)
     for one in shown:
-        path, runout = one.track.path, one.row["value"]
+        path, runout = one.track.path, one.member.value
         states = read_point_states(path, frame_steps(one.track, times))
         files = animate(view, states, times, f"{case.label}, {one.name}", runout, out / path.stem)
         two = read_point_states(path, [one.track.half_way, int(one.track.steps[-1])])

@@ -71,21 +71,23 @@ class _Stage:
             rows, columns, figsize=size, dpi=_DPI, squeeze=False, sharex=True, sharey=True
         )
         self.view, self._clouds = view, []
-        spacing = 72.0 * scale * (view.geometry.point_spacing or 0.0)
+        # A tenth larger than their spacing, else rounding to pixels leaves gaps between them.
+        spacing = 1.1 * 72.0 * scale * (view.geometry.point_spacing or 0.0)
         for line, quantity in zip(self.axes, view.quantities):
             label, factor = axis_label(quantity, 0.5 * (quantity.low + quantity.high))
             norm = matplotlib.colors.Normalize(quantity.low / factor, quantity.high / factor)
             colours = _COLOURS.get(quantity.property, FIELD_COLOURS)
             clouds = [
                 axis.scatter(
-                    [], [], c=[], cmap=colours, norm=norm, s=max(0.9 * spacing**2, 0.3),
+                    [], [], c=[], cmap=colours, norm=norm, s=max(spacing**2, 0.3),
                     marker="s", lw=0, rasterized=True, plotnonfinite=True,
                 )
                 for axis in line
             ]  # fmt: skip
             self._clouds.append((quantity, factor, clouds))
+            extend = "max" if quantity.low == 0.0 else "both"
             self.figure.colorbar(
-                clouds[0], ax=list(line), label=label, extend="both", pad=0.01, aspect=14
+                clouds[0], ax=list(line), label=label, extend=extend, pad=0.01, aspect=14
             )
         for axis in self.axes.flat:
             axis.set_aspect("equal")
@@ -121,15 +123,16 @@ def still_figure(view: View, states, title: str, runout: float):
     """These states (PointState) side by side, a row a quantity; the dashed line is the front."""
     stage = _Stage(view, len(states))
     for column, state in enumerate(states):
-        stage.show(column, state, f"{title if column == 0 else ''} t = {state.time:.2f} s".strip())
+        time = f"t = {state.time:.2f} s"
+        stage.show(column, state, f"{title}, {time}" if column == 0 else time)
     stage.mark_front(runout)
     return stage.figure
 
 
 @styled
 def animate(view: View, states, times, title: str, runout: float, path: Path) -> list:
-    """Writes `path`.gif, and `path`.mp4 where there is an ffmpeg that can, of one state (PointState)
-    for each of the `times` in s; returns the files. OSError goes through."""
+    """Writes `path`.gif, and `path`.mp4 if there is an ffmpeg that can, of one state (PointState) a
+    time of `times` in s; returns the files. OSError goes through."""
     stage = _Stage(view, 1)
     stage.mark_front(runout)
     digits, pictures = _digits(times), []
@@ -147,7 +150,7 @@ def animate(view: View, states, times, title: str, runout: float, path: Path) ->
 
 def _write_gif(pictures, path: Path) -> None:
     # The bars hold all shades: the palette of one frame serves them all.
-    first = pictures[0].quantize(dither=Image.Dither.NONE)
+    first = pictures[0].quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     others = [one.quantize(palette=first, dither=Image.Dither.NONE) for one in pictures[1:]]
     duration = [1000 // FRAMES_PER_SECOND] * len(others) + [_PAUSE]
     first.save(path, save_all=True, append_images=others, duration=duration, loop=0)

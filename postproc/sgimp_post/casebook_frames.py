@@ -81,6 +81,7 @@ def survey(path: Path, varied: str) -> Track:
         raise PostError(f"{path}: holds no state")
     (left, bottom), (right, top) = np.min(corners, axis=0)[0], np.max(corners, axis=0)[1]
     low, high = np.min(scales, axis=0)[:, 0], np.max(scales, axis=0)[:, 1]
+    low[1:] = 0.0  # of what begins at nothing and only grows
     half = int(np.flatnonzero(np.array(way) >= 0.5 * way[-1])[0])
     return Track(
         path,

@@ -1,4 +1,5 @@
-"""The picture of the members that stand for a case: the ground of each and where it came to rest."""
+"""The picture of the members that stand for a case: the ground of each and where it came to
+rest."""
 
 from __future__ import annotations
 

@@ -34,47 +34,49 @@ class Replay:
     was_there: bool = False
 
 
-def find_program(asked: str | None) -> Path:
+@dataclass(frozen=True)
+class Program:
+    path: Path
+    #: What it says of itself.
+    version: str
+
+
+def find_program(asked: str | None) -> Program:
     """`asked`, or the one that is built in this checkout, or the one on PATH. PostError if there
-    is none."""
-    if asked:
-        found = shutil.which(asked)
-        if found is None:
-            raise PostError(f"--sgimp {asked}: no such program, or it cannot be executed")
-        return Path(found).resolve()
-    found = str(_BUILT) if _BUILT.is_file() else shutil.which("sgimp")
+    is none, or it cannot be started."""
+    built = str(_BUILT) if _BUILT.is_file() else "sgimp"
+    found = shutil.which(asked or built)
+    if found is None and asked:
+        raise PostError(f"--sgimp {asked}: no such program, or it cannot be executed")
     if found is None:
         raise PostError(
             "the program sgimp is needed to replay members: name it with --sgimp, put it on PATH,"
             f" or build it (expected at {_BUILT})"
         )
-    return Path(found).resolve()
-
-
-def program_version(program: Path) -> str:
-    """What the program says of itself; PostError if it cannot be started."""
+    path = Path(found).resolve()
     try:
-        done = subprocess.run([str(program), "--version"], capture_output=True, text=True)
+        done = subprocess.run([str(path), "--version"], capture_output=True, text=True)
     except OSError as cause:
-        raise PostError(f"{program}: cannot be started ({cause.strerror})") from cause
+        raise PostError(f"{path}: cannot be started ({cause.strerror})") from cause
     if done.returncode != 0:
-        raise PostError(f"{program}: --version ends with exit code {done.returncode}")
-    return done.stdout.strip()
+        raise PostError(f"{path}: --version ends with exit code {done.returncode}")
+    return Program(path, " ".join(done.stdout.split()))
 
 
-def replay_case(ensemble, interval: float) -> str:
+def replay_case(ensemble, program: Program, interval: float) -> str:
     """The case file of replays: that of the run, with a state every `interval` seconds, which
-    changes no result. Files of fields, measurements and points stand in it with absolute paths."""
+    changes no result, and with the program that it is for. Files of fields, measurements and points
+    stand in it with absolute paths."""
     text, name = resolved_text(ensemble)
     text, count = re.subn(
         r"^(\s*snapshot_interval\s*=).*$", rf"\1 {interval:.17g}", text, flags=re.MULTILINE
     )
     if count != 1:
         raise PostError(f"{name}: no snapshot_interval in &output: not a resolved case file")
-    return text
+    return f"! For {program.version}.\n{text}"
 
 
-def replay(program: Path, text: str, case, member: int, home: Path) -> Replay:
+def replay(program: Program, text: str, case, member: int, home: Path) -> Replay:
     """Member `member` of `case` by the case file `text`, its states in `home`/snapshots. The case
     file and what the program printed stay in `home`/replays; while they are there and the text is
     the same, the program does not run again. PostError if `home` cannot be written."""
@@ -105,7 +107,7 @@ def _content(path: Path) -> str | None:
 
 def _run(program, case_file, label, member, home, printed) -> str:
     """Runs the program; what it says if it fails, else ''."""
-    command = [str(program), str(case_file.resolve()), "--output", str(home.resolve())]
+    command = [str(program.path), str(case_file.resolve()), "--output", str(home.resolve())]
     command += ["--realization", str(member), "--study-case", label, "--snapshots"]
     try:
         done = subprocess.run(
