@@ -49,7 +49,7 @@ def quantile_members(case, runout: str, is_weighted: bool = False) -> list:
         if is_weighted:
             value = _weighted_quantile(values, case.column("log_weight")[known], p)
         else:
-            value = ordered[_rank(p, len(ordered)) - 1]
+            value = ordered[math.ceil(p * len(ordered)) - 1]
         if math.isfinite(value):
             found[name] = value
     found[FARTHEST] = ordered[-1]
@@ -58,11 +58,6 @@ def quantile_members(case, runout: str, is_weighted: bool = False) -> list:
         member = int(ids[values == value].min())
         members[member] = QuantileMember(case.label, name, member, float(value))
     return sorted(members.values(), key=lambda member: member.value)
-
-
-def _rank(p: float, n: int) -> int:
-    """ceil(p n), at least 1. 1e-9: 0.05 times 20 must be 1 and not what rounding makes of it."""
-    return max(1, math.ceil(p * n - 1e-9))
 
 
 def _weighted_quantile(values, log_weights, p: float) -> float:
