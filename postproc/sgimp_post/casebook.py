@@ -85,29 +85,32 @@ def run(options) -> int:
             chapters.append({**entry, "exhibits": exhibits})
         gallery.write(out)
         page = out / "casebook.html"
-        page.write_text(
-            _environment()
-            .get_template("casebook.html.j2")
-            .render(
-                chapters=chapters,
-                directory=Path(options.directory).resolve(),
-                out=out,
-                runout=RUNOUTS[options.runout],
-                state=ensemble.state,
-                total=sum(case.role == "study" for case in ensemble.cases),
-                frames=frames,
-                recorded=f"sgimp {ensemble.attributes.get('version', '')}"
-                f" ({ensemble.attributes.get('git_hash', '')})",
-                replayed=program.version,
-                field_unit=_field_unit(ensemble),
-                post_version=__version__,
-            ),
-            encoding="utf-8",
-        )
+        page.write_text(_page(ensemble, chapters, program, options.runout, frames, out), "utf-8")
     except OSError as cause:
         raise PostError(f"{out}: cannot be written ({cause.strerror})") from cause
     print(page)
     return 1 if any(one.problem for chapter in chapters for one in chapter["exhibits"]) else 0
+
+
+def _page(ensemble, chapters, program, runout: str, frames: int, out: Path) -> str:
+    a = ensemble.attributes
+    return (
+        _environment()
+        .get_template("casebook.html.j2")
+        .render(
+            chapters=chapters,
+            directory=ensemble.directory.resolve(),
+            out=out,
+            runout=RUNOUTS[runout],
+            state=ensemble.state,
+            total=sum(case.role == "study" for case in ensemble.cases),
+            frames=frames,
+            recorded=f"sgimp {a.get('version', '')} ({a.get('git_hash', '')})",
+            replayed=program.version,
+            field_unit=_field_unit(ensemble),
+            post_version=__version__,
+        )
+    )
 
 
 def _replay(ensemble, case, members, program, frames: int, out: Path) -> list:

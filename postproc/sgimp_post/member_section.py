@@ -32,7 +32,7 @@ def member_entries(
         members = quantile_members(case, runout, ensemble.is_weighted)
         if not members:
             continue
-        fields = {m.id: rebuild.of(case, m.id) for m in members}
+        fields = rebuild.of(case, [member.id for member in members])
         deposits = {m.id: last_field(directory, case, m.id, quantity) for m in members}
         figure = member_figure(case, members, fields, deposits)
         entries.append(

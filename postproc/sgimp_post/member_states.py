@@ -13,6 +13,7 @@ from .namelist import read_namelist, resolved_text
 from .random_fields import read_random_fields
 from .samplers import Points
 from .snapshots import find_snapshots, list_steps, read_point_states
+from .two_level import MOST_DENSE
 
 #: Where `sgimp-post casebook DIR` leaves its replays, within DIR.
 CASEBOOK = "casebook"
@@ -34,8 +35,11 @@ class Field:
 
 def varied_property(ensemble) -> str:
     """The property that the first random field varies, as states name it; the friction angle where
-    there is none."""
-    groups = read_namelist(*resolved_text(ensemble))
+    there is none, or the namelist cannot be read."""
+    try:
+        groups = read_namelist(*resolved_text(ensemble))
+    except PostError:
+        groups = []
     keys = next((keys for name, keys in groups if name == "random_field"), {})
     return _state_name(str(keys.get("property", FRICTION_ANGLE)))
 
@@ -54,24 +58,27 @@ class FieldRebuild:
         except PostError:  # the run is older than the record of its fields
             self._fields = None
 
-    def of(self, case, member: int) -> Field | None:
-        """At the initial places of the points; None for homogeneous ground, imported fields and
-        fields that are not recorded."""
+    def of(self, case, ids) -> dict:
+        """Field by id at the initial places of the points; empty for homogeneous ground, imported
+        fields, and fields that are not recorded or too dear to rebuild."""
         fields = self._fields
         if fields is None or case.is_homogeneous or not case.has_recorded_fields:
-            return None
+            return {}
         spec = fields.specs[0]
+        is_dense = any(record.method == "cholesky" for record in spec.records.values())
+        if is_dense and spec.points.count > MOST_DENSE:
+            return {}
         try:
-            values = fields.values(case, np.array([member])).get(spec.name)
+            found = fields.values(case, np.array(ids)).get(spec.name)
         except PostError:  # another field is imported, or measurements are gone
-            values = None
-        if values is None:
-            return None
-        values, units = values[0], spec.units
+            found = None
+        if found is None:
+            return {}
+        units = spec.units
         if spec.property == "tan_friction_angle":
-            values, units = np.rad2deg(np.arctan(values)), "degree"
+            found, units = np.rad2deg(np.arctan(found)), "degree"
         names = _state_name(spec.property), _state_name(spec.name)
-        return Field(*names, units, spec.points, values)
+        return {one: Field(*names, units, spec.points, row) for one, row in zip(ids, found)}
 
 
 def last_field(directory: Path, case, member: int, quantity: str) -> Field | None:
