@@ -18,9 +18,9 @@ from .errors import PostError
 from .member_section import member_entries
 from .member_states import CASEBOOK, varied_property
 from .namelist import read_namelist, resolved_text
+from .page import environment, field_unit
 from .quantile_members import QuantileMember, quantile_members, shown_cases
 from .replays import Replay, find_program, replay, replay_case
-from .report import _environment, _field_unit
 from .snapshots import read_point_states
 from .style import FIGURE_KINDS, Gallery, rendered
 
@@ -95,7 +95,7 @@ def run(options) -> int:
 def _page(ensemble, chapters, program, runout: str, frames: int, out: Path) -> str:
     a = ensemble.attributes
     return (
-        _environment()
+        environment()
         .get_template("casebook.html.j2")
         .render(
             chapters=chapters,
@@ -107,7 +107,7 @@ def _page(ensemble, chapters, program, runout: str, frames: int, out: Path) -> s
             frames=frames,
             recorded=f"sgimp {a.get('version', '')} ({a.get('git_hash', '')})",
             replayed=program.version,
-            field_unit=_field_unit(ensemble),
+            field_unit=field_unit(ensemble),
             post_version=__version__,
         )
     )

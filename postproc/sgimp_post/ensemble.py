@@ -219,7 +219,7 @@ def most_variable(cases: list, most: int) -> list:
     strongest = {}
     for case in cases:
         known = strongest.get(case.acf)
-        if known is None or case.cov > known.cov:
+        if known is None or case.cov > known.cov:  # NaN, of a spread given otherwise, has no order
             strongest[case.acf] = case
     return list(strongest.values())[:most]
 

@@ -24,7 +24,7 @@ def maps_figure(spec, rows):
     low, high = np.quantile(everything, [0.005, 0.995])
     if high <= low:
         low, high = low - 1.0, high + 1.0
-    box = _box(spec.points)
+    box = bounding_box(spec.points)
     aspect = (box[3] - box[2]) / (box[1] - box[0])
     if aspect <= 0.5:  # two wide ones fill the page
         rows = [(case, acf, values[:2]) for case, acf, values in rows]
@@ -43,7 +43,7 @@ def maps_figure(spec, rows):
             axis.set_visible(False)
         for k, (axis, one) in enumerate(zip(line, values)):
             axis.grid(False)
-            drawn = _draw_map(axis, spec.points, one / factor, low, high)
+            drawn = draw_map(axis, spec.points, one / factor, low, high)
             axis.set_aspect("equal")
             axis.set_xlim(box[0], box[1])
             axis.set_ylim(box[2], box[3])
@@ -74,7 +74,7 @@ def maps_figure(spec, rows):
     return figure
 
 
-def _box(points):
+def bounding_box(points):
     half_x, half_y = 0.5 * points.width.max(), 0.5 * points.height.max()
     return (
         points.x.min() - half_x,
@@ -84,19 +84,19 @@ def _box(points):
     )
 
 
-def _draw_map(axis, points, values, low, high):
+def draw_map(axis, points, values, low, high):
     lattice = find_lattice(points)
     style = {"cmap": "RdYlBu_r", "vmin": low, "vmax": high, "rasterized": True}
     if lattice.is_lattice and min(len(lattice.x), len(lattice.y)) > 1:
         picture = np.full((len(lattice.y), len(lattice.x)), np.nan)
         picture[lattice.row, lattice.column] = values
         return axis.pcolormesh(
-            _edges(lattice.x), _edges(lattice.y), picture, shading="flat", **style
+            cell_edges(lattice.x), cell_edges(lattice.y), picture, shading="flat", **style
         )
     return axis.scatter(points.x, points.y, c=values, s=6, lw=0, **style)
 
 
-def _edges(line):
+def cell_edges(line):
     middle = 0.5 * (line[1:] + line[:-1])
     return np.r_[2.0 * line[0] - middle[0], middle, 2.0 * line[-1] - middle[-1]]
 

@@ -200,47 +200,6 @@ def weighted_figure(cases, name: str, deterministic: dict):
     return figure
 
 
-def _depths(case) -> np.ndarray:
-    """Depths of the members that did not fail, as far as they are known."""
-    if case.profile_height is None:
-        return np.empty((0, 0))
-    heights = case.profile_height[case.ok]
-    return heights[np.isfinite(heights).all(axis=1)]
-
-
-@styled
-def profile_figure(cases):
-    """Depth of the final deposit: median with the band from 5 to 95 % of the members."""
-    shown = [case for case in cases if len(_depths(case))]
-    if not shown:
-        return None
-    columns = min(3, len(shown))
-    rows = -(-len(shown) // columns)
-    figure, axes = plt.subplots(
-        rows, columns, figsize=(11.5, 2.1 * rows + 0.4), sharex=True, sharey=True, squeeze=False
-    )
-    reach = 0.0
-    for axis, case in zip(axes.flat, shown):
-        low, middle, high = np.percentile(_depths(case), [5, 50, 95], axis=0)
-        x = case.profile_x
-        axis.fill_between(x, low, high, color=colour(case), alpha=0.30, lw=0, label="5 to 95 %")
-        axis.plot(x, middle, color=colour(case), lw=1.4, label="median")
-        reach = max(reach, x[high > 0].max() if (high > 0).any() else 0.0)
-        axis.set_title(case.label)
-        if case.geometry.toe is not None:
-            axis.axvline(case.geometry.toe, color=INK, lw=0.8, ls=":")
-    for axis in axes.flat[len(shown) :]:
-        axis.axis("off")
-    axes[0, 0].set_xlim(shown[0].profile_x[0], 1.05 * reach + 0.1)
-    axes[0, 0].set_ylim(bottom=0)
-    axes[0, 0].legend()
-    for axis in axes[-1]:
-        axis.set_xlabel("x [m]")
-    for axis in axes[:, 0]:
-        axis.set_ylabel("depth [m]")
-    return figure
-
-
 @styled
 def configuration_figure(snapshot, geometry):
     """Initial field and final deposit, coloured by friction angle: red strong, blue weak

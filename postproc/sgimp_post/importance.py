@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .statistics import CONFIDENCE, _t_factor
+from .statistics import CONFIDENCE, t_factor
 
 #: Fewest effective members beyond a threshold, and fewest members that do not pass it, for its
 #: exceedance to be told. The second keeps to where the plan draws: below, few members with the
@@ -60,7 +60,7 @@ def weighted_probability(
         return Weighted(n, 0.0 if n else np.nan, *[np.nan] * 3, effective, False)
     terms = np.where(beyond, np.exp(log_w), 0.0)
     value, error = float(terms.mean()), float(np.std(terms, ddof=1) / np.sqrt(n))
-    half = _t_factor(max(2.0, effective), confidence) * error / value
+    half = t_factor(max(2.0, effective), confidence) * error / value
     return Weighted(
         n,
         value,
@@ -83,7 +83,7 @@ def weighted_mean(values, log_weights, confidence: float = CONFIDENCE) -> Weight
     w = w / w.sum()
     value = float(w @ s)
     error = float(np.sqrt(np.sum(w**2 * (s - value) ** 2)))
-    half = _t_factor(effective, confidence) * error
+    half = t_factor(effective, confidence) * error
     return Weighted(len(s), value, value - half, value + half, error, effective, True)
 
 
@@ -96,7 +96,7 @@ def weighted_sd(values, log_weights, confidence: float = CONFIDENCE) -> Weighted
         return Weighted(len(s), *[np.nan] * 4, mean.effective, False)
     sd = float(np.sqrt(squares.value))
     relative = 0.5 * squares.error / squares.value
-    half = _t_factor(mean.effective, confidence) * relative
+    half = t_factor(mean.effective, confidence) * relative
     return Weighted(
         len(s), sd, float(sd * np.exp(-half)), float(sd * np.exp(half)), sd * relative,
         mean.effective, True,

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from .field_figures import _box, _draw_map
+from .field_figures import bounding_box, draw_map
 from .style import INK, OTHER, axis_label, styled
 
 #: Red strong, blue weak; grey what is not a number. Few shades: of noise in 256 colours a picture
@@ -35,7 +35,7 @@ def member_figure(case, members, fields: dict, deposits: dict):
         for found in (fields, deposits)
     )
     x, y = _extent(case, members, deposits)
-    box = _box(next(iter(fields.values())).points) if fields else None
+    box = bounding_box(next(iter(fields.values())).points) if fields else None
     if box:
         y = min(y[0], box[2]), max(y[1], box[3])
     widths = [box[1] - box[0], x[1] - x[0]] if box else [x[1] - x[0]]
@@ -126,7 +126,7 @@ def _draw_field(axis, field, colours):
         return
     norm = colours["mappable"].norm if colours else None
     low, high = (norm.vmin, norm.vmax) if norm else (0.0, 1.0)
-    drawn = _draw_map(axis, field.points, field.values / colours.get("factor", 1.0), low, high)
+    drawn = draw_map(axis, field.points, field.values / colours.get("factor", 1.0), low, high)
     drawn.set_cmap(FIELD_COLOURS)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .ensemble import most_variable
 from .errors import PostError
 from .importance import exceedance_quantile, weighted_probability
 
@@ -68,11 +69,9 @@ def _weighted_quantile(values, log_weights, p: float) -> float:
 
 
 def shown_cases(ensemble, label: str | None = None) -> list:
-    """The case `label`, or those whose quantile members are worth a look: at most MOST_CASES study
-    cases, of each autocorrelation function the one of the largest coefficient of variation (there,
-    the members differ by their soil and not by noise) before a second one of any; without study
-    cases the homogeneous ones. With the rows that statistics may use, in the order of the plan.
-    PostError if no case is called `label`."""
+    """The case `label`, or those whose quantile members are worth a look: the most variable ones,
+    where members differ by their soil and not by noise; without study cases the homogeneous ones.
+    With the rows that statistics may use. PostError if no case is called `label`."""
     cases = ensemble.for_statistics()
     if label is not None:
         found = [case for case in cases if case.label == label]
@@ -81,15 +80,4 @@ def shown_cases(ensemble, label: str | None = None) -> list:
             raise PostError(f"no case is called '{label}': --study-case takes one of {known}")
         return found
     study = [case for case in cases if case.role == "study"]
-    study = study or [case for case in cases if case.is_homogeneous]
-    rank, seen = {}, {}
-    for case in sorted(study, key=lambda case: -_cov(case)):
-        seen[case.acf] = seen.get(case.acf, 0) + 1
-        rank[case.label] = seen[case.acf]
-    chosen = sorted(rank, key=rank.get)[:MOST_CASES]
-    return [case for case in study if case.label in chosen]
-
-
-def _cov(case) -> float:
-    """Where the spread is given otherwise it is NaN, which has no order."""
-    return case.cov if math.isfinite(case.cov) else 0.0
+    return most_variable(study or [case for case in cases if case.is_homogeneous], MOST_CASES)

@@ -3,33 +3,32 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 
-import jinja2
-
-from . import __version__, field_figures, figures, study_figures
+from . import __version__, field_figures, figures, reach, soil_map, study_figures
 from .analysis import analyse
-from .ensemble import RUNOUTS, read_ensemble
+from .ensemble import RUNOUTS, most_variable, read_ensemble
 from .errors import PostError
 from .field_audit import audit, audit_rows, one_of_each_acf
 from .fits import LAWS
 from .heat_table import heat_tables
+from .member_section import member_entries
 from .noise_floor import noise_floor
+from .page import environment, field_unit
 from .random_fields import read_random_fields
+from .reach_figures import overview_figure, reach_figure
 from .report_tables import report_tables
-from .snapshots import find_snapshots, read_snapshot
-from .style import UNIT_TEXTS, Gallery
+from .soil_map_figures import shared_limit, soil_map_figure
+from .style import Gallery
 from .tables import null_for_nan, write_table
 from .verdict import verdict, warnings
 
-#: Snapshots that are shown: the first of each case, at most so many; homogeneous ground first, then
-#: one of each autocorrelation function before a second one of any.
-MOST_CONFIGURATIONS = 6
 #: Cases whose own figure is shown.
 MOST_CASES = 15
 #: Members of each case whose fields are rebuilt and tested, at 10 ms each on a lattice of 80 x 80.
 AUDITED_MEMBERS = 30
+#: Cases whose surfaces and reach are drawn on their own.
+MOST_REACHES = 5
 #: Cases among the small multiples.
 MOST_MULTIPLES = 30
 #: Rows of paired differences that are shown of each kind, those of the smallest p first if there
@@ -43,10 +42,17 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
     output = Path(output) if output else Path(directory) / "report" / "report.html"
     summary = analyse(ensemble, primary)
     gallery = Gallery()
-    drawn = {**_figures(ensemble, summary, gallery), **_field_audit(ensemble, gallery)}
-    tables = report_tables(ensemble, summary)
+    reaches, (maps, notes) = reach.reaches(ensemble), soil_map.soil_maps(ensemble, primary)
+    drawn = {
+        **_figures(ensemble, summary, gallery),
+        **_reach(ensemble, reaches, gallery),
+        **_soil_maps(maps, notes, gallery),
+        **_field_audit(ensemble, gallery),
+        "members": member_entries(ensemble, primary, gallery),
+    }
+    tables = report_tables(ensemble, summary, reach.tables(reaches), soil_map.tables(maps))
     html = (
-        _environment()
+        environment()
         .get_template("report.html.j2")
         .render(
             **drawn,
@@ -57,7 +63,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
             warnings=warnings(summary),
             runouts=RUNOUTS,
             laws=LAWS,
-            field_unit=_field_unit(ensemble),
+            field_unit=field_unit(ensemble),
             pair_groups=_pair_groups(summary["pairs"]),
             files=[*tables, "report.json"],
             post_version=__version__,
@@ -90,12 +96,6 @@ def _pair_groups(pairs: list) -> list:
     return shown
 
 
-def _field_unit(ensemble) -> str:
-    """Of the property that the first random field varies, as the columns field_* have it."""
-    unit = next((case.units.get("field_mean", "") for case in ensemble.cases), "")
-    return UNIT_TEXTS.get(unit, unit)
-
-
 def _figures(ensemble, summary: dict, gallery: Gallery) -> dict:
     """Data URIs by the names of the template; None or empty where there is nothing to draw."""
     name = summary["primary"]
@@ -105,17 +105,12 @@ def _figures(ensemble, summary: dict, gallery: Gallery) -> dict:
     cases = [case for case in ensemble.for_statistics() if case.role == "study"]
     drawn = [case for case in cases if len(case.values(name))]
     plain = [] if ensemble.is_weighted else drawn
-    deposits = plain if ensemble.is_weighted else cases
-    profiles = figures.profile_figure(
-        deposits or [case for case in ensemble.cases if case.is_homogeneous]
-    )
     weighted = (
         figures.weighted_figure(drawn, name, shared) if ensemble.is_weighted and drawn else None
     )
     return {
         **_study_figures(plain, summary, shared, gallery),
         "weighted": gallery.add("weighted", weighted),
-        "profiles": gallery.add("profiles", profiles),
         "case_figures": {
             case.label: gallery.add(
                 f"case_{case.label}",
@@ -123,7 +118,6 @@ def _figures(ensemble, summary: dict, gallery: Gallery) -> dict:
             )
             for case in plain[:MOST_CASES]
         },
-        "configurations": _configurations(ensemble, gallery),
     }
 
 
@@ -166,48 +160,30 @@ def _field_audit(ensemble, gallery: Gallery) -> dict:
     }
 
 
-def _configurations(ensemble, gallery: Gallery) -> list:
-    shown, labels = [], set()
-    rank, seen = {}, {}
-    for order, case in enumerate(ensemble.cases):
-        seen[case.acf] = seen.get(case.acf, 0) + 1
-        rank[case.label] = (seen[case.acf], order)
-    found = [entry for entry in find_snapshots(ensemble.directory) if entry[0] in rank]
-    for label, member, path in sorted(found, key=lambda entry: rank[entry[0]]):
-        if label in labels or len(shown) >= MOST_CONFIGURATIONS:
-            continue
-        snapshot = read_snapshot(label, member, path)
-        figure = snapshot and figures.configuration_figure(snapshot, ensemble.case(label).geometry)
-        if figure:
-            labels.add(label)
-            image = gallery.add(f"{label}_r{member:06d}", figure)
-            shown.append({"label": label, "id": member, "image": image})
-    return shown
+def _reach(ensemble, reaches, gallery: Gallery) -> dict:
+    """Of each case where they are few; of many an overview, and the cases where the soil varies
+    most."""
+    shown = reaches if len(reaches) <= MOST_REACHES else most_variable(reaches, MOST_REACHES)
+    homogeneous = {case.label: case for case in ensemble.cases if case.is_homogeneous}
+    beside = {case.label: homogeneous.get(case.noise_case) for case in ensemble.cases}
+    overview = overview_figure(reaches) if len(reaches) > 1 else None
+    return {
+        "reaches": reaches,
+        "reach_overview": gallery.add("reach", overview),
+        "reach_figures": {
+            one.label: gallery.add(f"reach_{one.label}", reach_figure(one, beside[one.label]))
+            for one in shown
+        },
+    }
 
 
-def _environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("sgimp_post"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = _number
-    environment.filters["share"] = lambda value: _number(100.0 * max(value, 0.0), 0)
-    environment.filters["scientific"] = _scientific
-    environment.filters["percent"] = lambda value: _number(100.0 * value, 1)
-    return environment
-
-
-def _number(value, digits: int = 3) -> str:
-    """A number for a table; a dash for what is not known."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{value:.{digits}f}"
-
-
-def _scientific(value) -> str:
-    """A probability for a table, two digits."""
-    if value is None or not math.isfinite(value):
-        return "–"
-    return f"{value:.2g}" if value >= 1e-3 or value == 0.0 else f"{value:.1e}"
+def _soil_maps(maps, notes, gallery: Gallery) -> dict:
+    limit = shared_limit(maps)
+    return {
+        "soil_maps": maps,
+        "soil_map_notes": notes,
+        "soil_map_figures": [
+            gallery.add(f"soil_map_{one.label}_{one.spec.name}", soil_map_figure(one, limit))
+            for one in maps
+        ],
+    }

@@ -18,8 +18,8 @@ _STATISTICS = (
 )
 
 
-def report_tables(ensemble, summary: dict) -> dict:
-    """Those that have any row."""
+def report_tables(ensemble, summary: dict, *others: dict) -> dict:
+    """Those that have any row, `others` among them."""
     tables = {
         "members.csv": [row for case in ensemble.cases for row in _members(case)],
         "summary.csv": _summary(summary),
@@ -39,6 +39,8 @@ def report_tables(ensemble, summary: dict) -> dict:
             {"case": case["label"], **row} for case in summary["importance"] for row in case["rows"]
         ],
     }
+    for more in others:
+        tables.update(more)
     return {name: rows for name, rows in tables.items() if rows}
 
 

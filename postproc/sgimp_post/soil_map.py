@@ -18,7 +18,7 @@ from .ensemble import RUNOUTS, most_variable
 from .errors import PostError
 from .random_fields import read_random_fields
 from .samplers import Points
-from .statistics import CONFIDENCE, _t_factor, benjamini_hochberg, correlation_interval
+from .statistics import CONFIDENCE, benjamini_hochberg, correlation_interval, t_factor
 from .two_level import MOST_DENSE, SAME
 
 #: Share of the marked places that may be false ones.
@@ -427,7 +427,7 @@ def explained_share(design, y, confidence: float = CONFIDENCE) -> ExplainedShare
         return ExplainedShare(*[np.nan] * 3)
     value = 1.0 - by_model.sum() / by_mean.sum()
     rest = by_mean - by_model - value * by_mean
-    half = _t_factor(n, confidence) * np.std(rest, ddof=1) * np.sqrt(n) / by_mean.sum()
+    half = t_factor(n, confidence) * np.std(rest, ddof=1) * np.sqrt(n) / by_mean.sum()
     return ExplainedShare(float(value), float(value - half), float(value + half))
 
 

@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import Normalize, to_rgba
 
-from .field_figures import _box, _edges
+from .field_figures import bounding_box, cell_edges
 from .samplers import find_lattice
 from .style import INK, PROPERTY_TEXTS, styled
 
@@ -34,7 +34,7 @@ def shared_limit(maps: list) -> float:
 @styled
 def soil_map_figure(one, limit: float):
     """Points, blocks, and the blocks of either half of the members, on the scale +- `limit`."""
-    left, right, bottom, top = _box(one.body)
+    left, right, bottom, top = bounding_box(one.body)
     aspect = (top - bottom) / (right - left)
     figure, axes = plt.subplots(
         1,
@@ -75,7 +75,7 @@ def _draw_points(axis, points, found, scale):
     if lattice.is_lattice and min(len(lattice.x), len(lattice.y)) > 1:
         picture = np.ones((len(lattice.y), len(lattice.x), 4))
         picture[lattice.row, lattice.column] = colours
-        x, y = _edges(lattice.x), _edges(lattice.y)
+        x, y = cell_edges(lattice.x), cell_edges(lattice.y)
         axis.imshow(
             picture, extent=(x[0], x[-1], y[0], y[-1]), origin="lower", interpolation="none"
         )

@@ -130,7 +130,7 @@ def describe(values, confidence: float = CONFIDENCE) -> Description:
     if n == 0:
         return Description(0, *[np.nan] * 11)
     mean, sd = float(np.mean(x)), (float(np.std(x, ddof=1)) if n > 1 else np.nan)
-    half = _t_factor(n, confidence) * sd / np.sqrt(n)
+    half = t_factor(n, confidence) * sd / np.sqrt(n)
     low, high = sd_interval(x, confidence)
     p05, median, p95 = (float(q) for q in np.percentile(x, [5, 50, 95]))
     return Description(
@@ -255,7 +255,7 @@ def paired_difference(first, second, confidence: float = CONFIDENCE) -> Differen
     if n < 2:
         return Difference(n, float(d.mean()) if n else np.nan, np.nan, np.nan, np.nan)
     mean, error = float(d.mean()), float(np.std(d, ddof=1)) / np.sqrt(n)
-    half = _t_factor(n, confidence) * error
+    half = t_factor(n, confidence) * error
     if error == 0.0:
         p_value = 1.0 if mean == 0.0 else 0.0
     else:
@@ -348,7 +348,7 @@ def running(values, confidence: float = CONFIDENCE, points: int = 240) -> Runnin
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.maximum(squares - count * mean**2, 0.0) / (count - 1)
         sd = np.where(count > 1, np.sqrt(variance), np.nan)
-        half = _t_factor(count, confidence) * sd / np.sqrt(count)
+        half = t_factor(count, confidence) * sd / np.sqrt(count)
     low, high = np.array([sd_interval(x[:k], confidence) for k in count]).T
     return Running(count, mean + shift, mean + shift - half, mean + shift + half, sd, low, high)
 
@@ -373,7 +373,7 @@ def exceedance(values, confidence: float = CONFIDENCE, points: int = 160) -> Exc
     )
 
 
-def _t_factor(n, confidence: float):
+def t_factor(n, confidence: float):
     n = np.asarray(n, dtype=float)
     factor = stats.t.ppf(0.5 + 0.5 * confidence, np.where(n > 1, n - 1, np.nan))
     return float(factor) if factor.ndim == 0 else factor

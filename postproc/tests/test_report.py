@@ -64,9 +64,8 @@ def report(directory, capsys):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """For tests of words and numbers: drawing is nine tenths of the time."""
-    names = ("comparison", "study", "profiles")
-    drawn = {"case_figures": {}, "configurations": [], **dict.fromkeys(names)}
-    monkeypatch.setattr("sgimp_post.report._figures", lambda *_: drawn)
+    for name in ("_figures", "_reach", "_soil_maps", "_field_audit", "member_entries"):
+        monkeypatch.setattr(f"sgimp_post.report.{name}", lambda *_: {})
 
 
 def assert_page_is_sound(html, directory):
