@@ -10,6 +10,7 @@ from .ensemble import RUNOUTS, Case, Ensemble, read_ensemble
 from .merge import PROGRAM
 from .namelist import by_key, differing_keys, identity_by_key, read_namelist, resolved_text
 from .noise_floor import noise_floor
+from .pairs import paired_values
 from .statistics import holm
 from .two_samples import TwoSamples, compare
 
@@ -174,9 +175,7 @@ def _floors(cases: dict) -> dict:
 def _values(first: Case, second: Case, name: str, is_paired: bool):
     if not is_paired:
         return first.values(name), second.values(name)
-    _, one, two = np.intersect1d(first.id, second.id, return_indices=True)
-    good = first.ok[one] & second.ok[two]
-    return first.column(name)[one][good], second.column(name)[two][good]
+    return paired_values(first, second, name)
 
 
 def _unmatched(first: Ensemble, second: Ensemble):

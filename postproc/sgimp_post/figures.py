@@ -33,7 +33,7 @@ def case_figure(case, name: str, deterministic: dict):
     (first, second), (third, fourth) = axes
     fits = [fit for fit in fit_laws(values) if not fit.note]
     _running(first, values, colour(case), deterministic)
-    _histogram(second, values, fits, colour(case), deterministic)
+    draw_histogram(second, values, fits, colour(case), deterministic)
     _quantiles(third, values, fits)
     draw_exceedance(fourth, [case], name, deterministic)
     for axis in (second, fourth):
@@ -54,17 +54,12 @@ def mark_deterministic(axis, deterministic: dict, vertical: bool = True):
         span(mean - sd, mean + sd, color=INK, alpha=0.10, lw=0, label="noise floor ±1 sd")
 
 
-def _histogram(axis, values, fits, tint, deterministic):
+def draw_histogram(axis, values, fits, tint, deterministic):
     if len(values) == 0:
         axis.text(0.5, 0.5, "no values yet", ha="center", transform=axis.transAxes)
         return
     margin = 0.25 * max(np.ptp(values), 1e-3)
-    # numpy refuses to cut a range of a few roundings into bins.
-    is_flat = np.ptp(values) <= 1e-12 * np.max(np.abs(values))
-    bars = {"bins": 10, "range": (values.min() - margin, values.max() + margin)}
-    if not is_flat:
-        bars = {"bins": bin_count(values)}
-    axis.hist(values, **bars, density=True, color=tint, alpha=0.30, edgecolor="white")
+    draw_bars(axis, values, tint)
     if len(values) <= MOST_TICKS:
         axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
     x = np.linspace(values.min() - margin, values.max() + margin, 300)
@@ -103,8 +98,23 @@ def _quantiles(axis, values, fits):
     axis.set_ylabel("quantile of the members [m]")
 
 
-def bin_count(values) -> int:
-    """By Freedman and Diaconis from 30 values on, within MOST_BINS."""
+def draw_bars(axis, values, tint):
+    """A histogram of densities in one outline; its bins by Freedman and Diaconis from 30 values on,
+    MOST_BINS at most."""
+    reach = np.ptp(values)
+    # numpy refuses to cut a range of a few roundings into bins.
+    if reach <= 1e-12 * np.max(np.abs(values)):
+        margin = 0.25 * max(reach, 1e-3)
+        density, edges = np.histogram(
+            values, 10, (values.min() - margin, values.max() + margin), density=True
+        )
+    else:
+        density, edges = np.histogram(values, _bin_count(values), density=True)
+    axis.stairs(density, edges, fill=True, color=tint, alpha=0.30)
+    axis.stairs(density, edges, color=tint, lw=0.7)
+
+
+def _bin_count(values) -> int:
     if len(values) < 30:
         return max(3, min(10, len(values) // 2))
     low, high = np.percentile(values, [25, 75])

@@ -40,10 +40,15 @@ def _text(case, key):
     return case.acf if key == "acf" else f"{case.cov:.12g}"
 
 
-def _row(by, first, second, name, noise) -> dict:
+def paired_values(first, second, name):
+    """Values of the members that did not fail in either case, in order of id."""
     _, one, two = np.intersect1d(first.id, second.id, return_indices=True)
     good = first.ok[one] & second.ok[two]
-    difference = paired_difference(first.column(name)[one][good], second.column(name)[two][good])
+    return first.column(name)[one][good], second.column(name)[two][good]
+
+
+def _row(by, first, second, name, noise) -> dict:
+    difference = paired_difference(*paired_values(first, second, name))
     floors = [noise.get(case.label, np.nan) for case in (first, second)]
     floor = float(np.max(floors))  # of the noisier one; not known if either is not
     return {

@@ -334,7 +334,7 @@ def correlation_interval(r: float, n: int, confidence: float = CONFIDENCE):
     return float(np.tanh(middle - half)), float(np.tanh(middle + half))
 
 
-def running(values, confidence: float = CONFIDENCE, points: int = 240) -> Running:
+def running(values, confidence: float = CONFIDENCE, points: int = 120) -> Running:
     """At most `points` counts, evenly spread; always the first two and the last."""
     x = finite(values)
     n = len(x)

@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from .ensemble import RUNOUTS
-from .figures import bin_count, draw_exceedance, mark_deterministic
+from .figures import draw_bars, draw_exceedance, mark_deterministic
 from .fits import LAWS, best_fit, distribution_of, fit_laws
 from .style import INK, LAW_STYLES, acf_colour, colour, styled
 
@@ -36,8 +36,7 @@ def multiples_figure(cases, name: str, deterministic: dict):
     for case, place in zip(cases, places):
         axis, x = axes[place], values[case.label]
         axis.axis("on")
-        count = bin_count(x) if np.ptp(x) > 1e-12 * np.abs(x).max() else 1
-        axis.hist(x, count, density=True, color=colour(case), alpha=0.35, edgecolor="white", lw=0.4)
+        draw_bars(axis, x, colour(case))
         best = best_fit(fit_laws(x))
         if best:
             shade, dash = LAW_STYLES[best.law]
@@ -75,34 +74,36 @@ def comparison_figure(cases, name, deterministic):
     return figure
 
 
+def draw_against_cov(axis, cases, estimate):
+    """`estimate(case)`, a value with the ends of its interval, a line an autocorrelation function;
+    `cases`: dictionaries with acf and cov."""
+    acfs = sorted({case["acf"] for case in cases})
+    for k, acf in enumerate(acfs):
+        rows = sorted((case for case in cases if case["acf"] == acf), key=lambda case: case["cov"])
+        x = np.array([row["cov"] for row in rows]) + 0.0012 * (k - 0.5 * (len(acfs) - 1))
+        y, low, high = np.array([estimate(row) for row in rows], dtype=float).T
+        tint, span = acf_colour(acf), np.abs([y - low, high - y])
+        axis.errorbar(
+            x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper()
+        )
+    axis.set_xlabel("coefficient of variation")
+
+
 @styled
 def study_figure(summary: dict):
     """Mean, standard deviation and exceedance probability against the coefficient of variation
     (Figs. 13 and 14 of the paper), one line an autocorrelation function."""
     name, floor = summary["primary"], summary["deterministic"][summary["primary"]]
     figure, axes = plt.subplots(1, 3, figsize=(11.5, 3.3))
-    acfs = sorted({case["acf"] for case in summary["cases"]})
-    for k, acf in enumerate(acfs):
-        rows = sorted(
-            (case for case in summary["cases"] if case["acf"] == acf), key=lambda c: c["cov"]
+    cases = summary["cases"]
+    for axis, value in ((axes[0], "mean"), (axes[1], "sd")):
+        keys = (value, f"{value}_low", f"{value}_high")
+        draw_against_cov(
+            axis, cases, lambda case, keys=keys: [case["runouts"][name][k] for k in keys]
         )
-        x = np.array([row["cov"] for row in rows]) + 0.0012 * (k - 0.5 * (len(acfs) - 1))
-        for axis, value, low, high in (
-            (axes[0], "mean", "mean_low", "mean_high"),
-            (axes[1], "sd", "sd_low", "sd_high"),
-        ):
-            got = [row["runouts"][name] for row in rows]
-            y = np.array([row[value] for row in got])
-            span = [y - [row[low] for row in got], [row[high] for row in got] - y]
-            tint = acf_colour(acf)
-            axis.errorbar(
-                x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper()
-            )
-        shares = [row["exceedance"] for row in rows]
-        y = np.array([row["value"] for row in shares])
-        span = [y - [row["low"] for row in shares], [row["high"] for row in shares] - y]
-        tint = acf_colour(acf)
-        axes[2].errorbar(x, y, np.abs(span), color=tint, marker="o", ms=4, capsize=2, lw=1.3)
+    draw_against_cov(
+        axes[2], cases, lambda case: [case["exceedance"][k] for k in ("value", "low", "high")]
+    )
     mark_deterministic(axes[0], floor, vertical=False)
     if np.isfinite(floor["sd"]):
         axes[1].axhline(floor["sd"], color=INK, lw=1.1, ls=(0, (4, 2)), label="noise floor")
@@ -111,8 +112,6 @@ def study_figure(summary: dict):
     axes[1].set_ylim(bottom=0)
     axes[2].set_ylabel("P(runout > homogeneous mean)")
     axes[2].set_ylim(0, 1)
-    for axis in axes:
-        axis.set_xlabel("coefficient of variation")
     axes[1].legend()
     return figure
 
