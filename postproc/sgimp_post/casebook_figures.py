@@ -149,11 +149,20 @@ def animate(view: View, states, times, title: str, runout: float, path: Path) ->
 
 
 def _write_gif(pictures, path: Path) -> None:
-    # The bars hold all shades: the palette of one frame serves them all.
-    first = pictures[0].quantize(method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    others = [one.quantize(palette=first, dither=Image.Dither.NONE) for one in pictures[1:]]
-    duration = [1000 // FRAMES_PER_SECOND] * len(others) + [_PAUSE]
-    first.save(path, save_all=True, append_images=others, duration=duration, loop=0)
+    palette = _palette(pictures[0])
+    frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
+    duration = [1000 // FRAMES_PER_SECOND] * (len(frames) - 1) + [_PAUSE]
+    frames[0].save(path, save_all=True, append_images=frames[1:], duration=duration, loop=0)
+
+
+def _palette(picture) -> Image.Image:
+    """The 256 most frequent colours of a frame as they are; Pillow would take means, and white is no
+    longer white. The bars hold all shades: those of one frame serve them all."""
+    colours, count = np.unique(np.asarray(picture).reshape(-1, 3), axis=0, return_counts=True)
+    frequent = colours[np.argsort(-count, kind="stable")[:256]]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(np.resize(frequent, (256, 3)).tobytes())
+    return palette
 
 
 def _write_film(pictures, path: Path) -> bool:

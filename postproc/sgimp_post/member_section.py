@@ -38,7 +38,7 @@ def member_entries(
         entries.append(
             {
                 "label": case.label,
-                "title": f"{case.label}, {case.count} members",
+                "title": f"{case.label}, {case.count} member{'s' * (case.count > 1)}",
                 "image": gallery.add(f"members_{case.label}", figure),
                 "runout": RUNOUTS[runout],
                 "rows": [_row(case, member) for member in members],
