@@ -149,20 +149,28 @@ def animate(view: View, states, times, title: str, runout: float, path: Path) ->
 
 
 def _write_gif(pictures, path: Path) -> None:
-    palette = _palette(pictures[0])
-    frames = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in pictures]
+    """In the 256 most frequent colours of the first frame, exactly; others become the nearest of
+    them. (Pillow's own palettes are means, and its nearest is a near one: white is not white.)"""
+    colours, _, count = _colours_of(pictures[0])
+    # The bars hold all shades: those of one frame serve them all.
+    palette = colours[np.argsort(-count, kind="stable")[:256]]
+    frames = []
+    for picture in pictures:
+        colours, index, _ = _colours_of(picture)
+        distance = np.square(colours[:, None, :] - palette[None, :, :]).sum(axis=2)
+        nearest = distance.argmin(axis=1).astype(np.uint8)
+        frame = Image.fromarray(nearest[index].reshape(picture.size[::-1]), mode="P")
+        frame.putpalette(np.resize(palette, (256, 3)).astype(np.uint8).tobytes())
+        frames.append(frame)
     duration = [1000 // FRAMES_PER_SECOND] * (len(frames) - 1) + [_PAUSE]
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=duration, loop=0)
 
 
-def _palette(picture) -> Image.Image:
-    """The 256 most frequent colours of a frame as they are; Pillow would take means, and white is no
-    longer white. The bars hold all shades: those of one frame serve them all."""
-    colours, count = np.unique(np.asarray(picture).reshape(-1, 3), axis=0, return_counts=True)
-    frequent = colours[np.argsort(-count, kind="stable")[:256]]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(np.resize(frequent, (256, 3)).tobytes())
-    return palette
+def _colours_of(picture):
+    """The colours of a picture [n, 3], which of them each pixel has, how many pixels have each."""
+    rgb = np.asarray(picture).reshape(-1, 3).astype(np.int64)
+    code, index, count = np.unique(rgb @ [65536, 256, 1], return_inverse=True, return_counts=True)
+    return np.column_stack([code >> 16, code >> 8 & 255, code & 255]), index.reshape(-1), count
 
 
 def _write_film(pictures, path: Path) -> bool:

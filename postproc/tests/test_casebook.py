@@ -7,9 +7,11 @@ import h5py
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from PIL import Image
 from synthetic import sample, write_ensemble
 from synthetic_fields import lattice_points, white_noise, write_run
 
+from sgimp_post.casebook_figures import _write_gif
 from sgimp_post.casebook_frames import (
     Quantity,
     Track,
@@ -169,6 +171,7 @@ def test_the_last_state_is_found_in_snapshots_and_in_the_casebook(run_with_field
 
 def test_entries_have_a_light_figure_and_a_row_a_member(run_with_field):
     gallery = Gallery()
+    write_states(run_with_field / "casebook", 2)
     with h5py.File(run_with_field / "ensemble.h5", "r+") as file:
         file["cases/snx_cov0.10/runout_max"][...] = [5.4, 5.2, 5.3, 5.1]
     (entry,) = member_entries(read_ensemble(run_with_field), "runout_max", gallery)
@@ -177,8 +180,8 @@ def test_entries_have_a_light_figure_and_a_row_a_member(run_with_field):
     assert set(gallery.files) == {"members_snx_cov0.10.svg", "members_snx_cov0.10.pdf"}
     svg = gallery.files["members_snx_cov0.10.svg"]
     assert len(svg) < 150_000
-    # Three fields as pictures, three profiles, and no point as a mark of its own.
-    assert svg.count(b"<image") == 3
+    # Three fields and the points of one member as pictures; no point as a mark of its own.
+    assert svg.count(b"<image") == 4
     assert all(f"{row[0]}: member {row[1]}, {row[2]:.3f} m".encode() in svg for row in rows)
 
 
@@ -194,6 +197,18 @@ def test_figure_marks_the_front_and_says_what_is_missing(tmp_path):
     assert b"no profile and no state" in rendered(figure)
     plt.close(figure)
     assert member_figure(case, [], {}, {}) is None
+
+
+def test_gif_has_the_frames_and_the_colours_of_its_pictures(tmp_path):
+    """To the bit, as far as the first one has no more than 256: white stays white."""
+    greys = np.repeat(np.arange(256, dtype=np.uint8), 3).reshape(16, 16, 3)
+    frames = [np.roll(greys, k, axis=0) for k in range(3)]
+    _write_gif([Image.fromarray(frame) for frame in frames], tmp_path / "a.gif")
+    with Image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == 3
+        for k, frame in enumerate(frames):
+            film.seek(k)
+            assert np.array_equal(np.asarray(film.convert("RGB")), frame)
 
 
 def test_survey_reads_ranges_scales_and_half_of_the_way(tmp_path):
