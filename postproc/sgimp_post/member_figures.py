@@ -13,13 +13,13 @@ from .style import INK, OTHER, axis_label, styled
 
 #: Red strong, blue weak; grey what is not a number. Few shades: of noise in 256 colours a picture
 #: takes twice the bytes and shows no more.
-FIELD_COLOURS = matplotlib.colormaps["RdYlBu_r"].resampled(16).with_extremes(bad="#B4BEC6")
+FIELD_COLOURS = matplotlib.colormaps["RdYlBu_r"].resampled(8).with_extremes(bad="#B4BEC6")
 #: A field whose spread is below this share of its mean is homogeneous ground with its jitter
 #: (1e-6), in one colour and without a bar.
 UNIFORM = 1e-4
 
 #: Inches: most width of the picture and height of a row, what is not drawn on beside and between.
-_WIDTH, _HEIGHT, _MARGIN, _GAP = 8.6, 1.9, 1.75, 0.30
+_WIDTH, _HEIGHT, _MARGIN, _GAP = 7.0, 1.9, 1.6, 0.30
 
 
 @styled
