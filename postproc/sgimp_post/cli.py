@@ -26,6 +26,7 @@ def main(arguments=None) -> int:
     _add_watch(commands)
     _add_export(commands)
     _add_casebook(commands)
+    _add_paper(commands)
     options = parser.parse_args(arguments)
     try:
         return options.run(options)
@@ -254,5 +255,31 @@ def _add_casebook(commands):
 
 def _casebook(options) -> int:
     from .casebook import run
+
+    return run(options)
+
+
+def _add_paper(commands):
+    paper = commands.add_parser(
+        "paper", help="the paper of 2022 beside a run of input/paper/study.nml or baseline.nml"
+    )
+    paper.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+    paper.add_argument(
+        "--out", type=Path, metavar="DIR2", help="where the page goes (default DIR/paper)"
+    )
+    _add_runout(paper, "that verdicts, fits and tables use")
+    paper.add_argument(
+        "--sensitivity",
+        type=Path,
+        nargs="+",
+        default=[],
+        metavar="DIR",
+        help="runs of the same seed with other keys, compared member by member",
+    )
+    paper.set_defaults(run=_paper)
+
+
+def _paper(options) -> int:
+    from .paper_report import run
 
     return run(options)

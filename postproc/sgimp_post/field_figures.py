@@ -58,8 +58,10 @@ def maps_figure(spec, rows):
             f"{acf_text(acf)}\nCOV {case.cov:g}"
             if spec.has_cov and spec.index == 1
             else acf_text(acf),
-            (-0.36 if aspect > 0.5 else -0.14, 0.5),
+            (0.0, 0.5),
+            (-42, 0),  # a share of the axis would not stay what the layout has made room for
             xycoords="axes fraction",
+            textcoords="offset points",
             rotation=90,
             ha="center",
             va="center",

@@ -31,7 +31,7 @@ def case_figure(case, name: str, deterministic: dict):
     values = case.values(name)
     figure, axes = plt.subplots(2, 2, figsize=(9.6, 6.4))
     (first, second), (third, fourth) = axes
-    fits = [fit for fit in fit_laws(values) if not fit.note]
+    fits = fit_laws(values)
     _running(first, values, colour(case), deterministic)
     draw_histogram(second, values, fits, colour(case), deterministic)
     _quantiles(third, values, fits)
@@ -64,6 +64,8 @@ def draw_histogram(axis, values, fits, tint, deterministic):
         axis.plot(values, np.zeros_like(values), "|", color=tint, ms=7, alpha=0.6)
     x = np.linspace(values.min() - margin, values.max() + margin, 300)
     for fit in fits:
+        if fit.note:
+            continue
         shade, dash = LAW_STYLES[fit.law]
         axis.plot(x, distribution_of(fit).pdf(x), color=shade, ls=dash, lw=1.4, label=LAWS[fit.law])
     mark_deterministic(axis, deterministic)
@@ -81,6 +83,8 @@ def _quantiles(axis, values, fits):
     observed = np.sort(values)[rank - 1]
     best = best_fit(fits)
     for fit in fits:
+        if fit.note:
+            continue
         shade, dash = LAW_STYLES[fit.law]
         x = distribution_of(fit).ppf((rank - 0.5) / n)
         axis.plot(x, observed, color=shade, ls=dash, lw=1.4, label=LAWS[fit.law])
@@ -90,7 +94,7 @@ def _quantiles(axis, values, fits):
                 for p in (0.025, 0.975)
             )
             axis.fill_between(x, low, high, color=shade, alpha=0.12, lw=0, label="95 % of samples")
-    if fits:
+    if best:
         ends = [observed[0], observed[-1]]
         axis.plot(ends, ends, color=INK, lw=0.8)
         axis.legend(loc="upper left", bbox_to_anchor=(0.0, -0.22), ncol=3)
