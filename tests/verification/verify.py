@@ -17,6 +17,7 @@ import cases_manufactured
 import cases_motion
 import cases_relaxation
 import cases_slope
+import cases_stability
 import cases_strength
 import numpy as np
 from runner import Bench
@@ -41,6 +42,7 @@ CASES = {
     "cantilever": (14, cases_beam.cantilever),
     "relaxed_column": ("-", cases_relaxation.relaxed_column),
     "footing": (15, cases_footing.footing),
+    "slope_stability": ("-", cases_stability.slope_stability),
 }
 
 COLUMNS = ("ours", "error", "allowed (and why)")
