@@ -53,19 +53,19 @@ def print_table(case, failed):
 
 def panel(figure, axis, position, values, label, **limits):
     """The points, coloured by a value each."""
-    drawn = axis.scatter(*position.T, c=values, s=1.2, marker="s", lw=0, rasterized=True, **limits)
+    drawn = axis.scatter(*position.T, c=values, s=1.6, marker="s", lw=0, rasterized=True, **limits)
     axis.set_aspect("equal")
     axis.set_xlim(0.0, 27.0)
     axis.set_ylim(0.0, 10.5)
     axis.grid(False)
-    figure.colorbar(drawn, ax=axis, label=label, shrink=0.8)
+    figure.colorbar(drawn, ax=axis, label=label, shrink=0.75)
 
 
 @styled
 def picture(members, runouts):
     """A row a member: friction angle and cohesion at the start, displacement at the end."""
     members = sorted(members, key=lambda member: runouts[member[1]])
-    figure, axes = plt.subplots(len(members), 3, figsize=(13.0, 2.2 * len(members)), squeeze=False, sharex=True)
+    figure, axes = plt.subplots(len(members), 3, figsize=(13.0, 1.9 * len(members)), squeeze=False, sharex=True)
     for row, (_, member, path) in zip(axes, members, strict=True):
         steps = list_steps(path)
         first, last = read_point_states(path, (steps[0], steps[-1]))
@@ -73,7 +73,7 @@ def picture(members, runouts):
         friction, cohesion = first.values["friction_angle"], first.values["cohesion"]
         panel(figure, row[0], first.position, friction, "friction angle [°]", cmap="viridis", vmin=15, vmax=45)
         panel(figure, row[1], first.position, cohesion / 1e3, "cohesion [kPa]", cmap="viridis", vmin=0, vmax=15)
-        panel(figure, row[2], last.position, way, "displacement [m]", cmap="cividis", vmin=0)
+        panel(figure, row[2], last.position, way, "displacement [m]", cmap="cividis", vmin=0, vmax=6)
         row[0].set_title(f"member {member}")
         row[2].set_title(f"farthest point at {runouts[member]:.1f} m")
         row[0].set_ylabel("y [m]")
