@@ -8,7 +8,7 @@ import numpy as np
 
 from .ensemble import RUNOUTS, STATUS_TEXTS
 from .events import EVENTS_NAME, rank_seconds, read_starts
-from .fits import best_fit, fit_laws, rivals
+from .fits import rivals
 from .importance import (
     effective_size,
     exceedance_quantile,
@@ -16,14 +16,18 @@ from .importance import (
     weighted_probability,
     weighted_sd,
 )
+from .law_choice import choose_law
 from .noise_floor import against_floor, noise_floor
 from .pairs import paired_experiments
 from .statistics import describe, describe_pairs, wilson
 from .two_level import control_estimates
+from .verdict import law_sentence
 
 #: Of all ranks together, below which the share that members took is not told: the clock of the
 #: events goes in seconds.
 FEWEST_SECONDS = 100.0
+#: Bootstrap samples of each kind behind the choice of a law; `sgimp-post fit` takes more.
+LAW_SAMPLES = 199
 #: Exceedances whose runout is looked up in a run with importance sampling.
 RARE = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
@@ -84,8 +88,7 @@ def _case(case, primary: str, homogeneous, is_weighted: bool) -> dict:
     values = drawn.values(primary)
     floor = noise_floor(homogeneous)[primary]
     against = against_floor(drawn, homogeneous)
-    fits = fit_laws(values)
-    best = best_fit(fits)
+    choice = choose_law(values, LAW_SAMPLES, np.random.default_rng(case.order))
     ok = case.ok
     shift, noise = against[primary]["shift"]["mean"], floor["sd"]
     return {
@@ -109,9 +112,18 @@ def _case(case, primary: str, homogeneous, is_weighted: bool) -> dict:
         "height_wall": asdict(describe(drawn.values("height_wall"))),
         "against_floor": against,
         "exceedance": against[primary]["exceedance"]["share"],
-        "fits": [asdict(fit) for fit in fits],
-        "best": best.law if best else "",
-        "rivals": [fit.law for fit in rivals(fits)],
+        "fits": [
+            {
+                **asdict(fit),
+                "wins": choice.wins.get(fit.law, np.nan),
+                "p_value": choice.p_value.get(fit.law, np.nan),
+            }
+            for fit in choice.fits
+        ],
+        "best": choice.law,
+        "rivals": [fit.law for fit in rivals(choice.fits)],
+        "law_is_refuted": choice.is_refuted,
+        "law_sentence": law_sentence(choice),
         "noise_share": 1.0 - against[primary]["soil_share"]["value"],
         "shift": shift,
         "shift_below_noise": bool(abs(shift) < noise) if np.isfinite(shift * noise) else False,

@@ -12,14 +12,13 @@ import numpy as np
 
 from .ensemble import RUNOUTS, Ensemble, read_ensemble
 from .errors import PostError
-from .fits import LAWS, rivals
-from .law_choice import FEWEST_FOR_BOOTSTRAP, LawChoice, choose_law
+from .fits import LAWS
+from .law_choice import LawChoice, choose_law
 from .tables import null_for_nan, write_table
+from .verdict import law_sentence
 
 #: Fewest bootstrap samples: with less, the ends of a 95 % interval are those of the samples.
 FEWEST_SAMPLES = 100
-#: A law is refuted below this p value.
-LEVEL = 0.05
 #: Values beyond a quantile below which it is an extrapolation.
 _FEW_BEYOND = 5
 #: Of the run, in fit.json.
@@ -90,7 +89,7 @@ def _lines(label: str, choice: LawChoice, options):
             line += f" {100 * choice.wins[fit.law]:>4.0f} % {choice.statistic[fit.law]:>7.3f}"
             line += f" {choice.p_value[fit.law]:>6.3f}"
         yield line
-    yield "  " + verdict(choice)
+    yield "  " + law_sentence(choice)
     if not choice.wins:
         return
     yield f"  {'quantile':<10} {'value':>8}   {'95 %, law certain':<20} 95 %, with its choice"
@@ -99,28 +98,6 @@ def _lines(label: str, choice: LawChoice, options):
         line += f"{q.low:.3f} to {q.high:.3f}".ljust(21)
         line += f"{q.choice_low:.3f} to {q.choice_high:.3f}"
         yield line + (f"   {q.beyond} members beyond" if q.beyond < _FEW_BEYOND else "")
-
-
-def verdict(choice: LawChoice) -> str:
-    """The chosen law and what is to be thought of it, in one sentence."""
-    if not choice.law:
-        return "No law could be fitted."
-    best = next(fit for fit in choice.fits if fit.law == choice.law)
-    text = f"{LAWS[best.law]} fits best (Akaike weight {best.weight:.2f}"
-    if choice.wins:
-        text += f", best in {100 * choice.wins[best.law]:.0f} % of the resamples"
-    text += ")"
-    close = rivals(choice.fits)
-    if close:
-        text += ", not told apart from " + ", ".join(LAWS[fit.law] for fit in close)
-    if not choice.p_value:
-        return text + f"; fewer than {FEWEST_FOR_BOOTSTRAP} members say no more."
-    p = choice.p_value[best.law]
-    passing = [LAWS[law] for law, value in choice.p_value.items() if value >= LEVEL]
-    if p >= LEVEL:
-        return text + f"; the members do not speak against it (p = {p:.2g})."
-    others = f"not against {', '.join(passing)}" if passing else "as against every other law here"
-    return text + f"; but the members speak against it (p = {p:.2g}), {others}."
 
 
 def _write(directory: Path, ensemble: Ensemble, choices: dict, options) -> None:
@@ -134,7 +111,7 @@ def _write(directory: Path, ensemble: Ensemble, choices: dict, options) -> None:
             {
                 "case": label,
                 "law": choice.law,
-                "verdict": verdict(choice),
+                "verdict": law_sentence(choice),
                 "fits": rows,
                 "quantiles": found,
             }

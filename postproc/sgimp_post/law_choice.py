@@ -23,6 +23,8 @@ from .fits import (
 from .statistics import CONFIDENCE, blocks, finite
 
 PROBABILITIES = (0.95, 0.99, 0.999)
+#: A law is refuted below this p value.
+LEVEL = 0.05
 #: Fewest values for a bootstrap.
 FEWEST_FOR_BOOTSTRAP = 8
 _TAILS = (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE)
@@ -54,6 +56,11 @@ class LawChoice:
     wins: dict
     law: str
     quantiles: list
+
+    @property
+    def is_refuted(self) -> bool:
+        """The members speak against the chosen law."""
+        return bool(self.p_value.get(self.law, 1.0) < LEVEL)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ def reach_figure(entry, homogeneous=None):
         _draw_curve(bottom, entry, one, tint, dash, f"{one.depth:.3g} m: {one.words}")
     _finish_curves(bottom, [entry])
     bottom.set_ylabel("P(depth at x), 95 % [–]")
-    bottom.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), title="this deep or deeper")
+    _legend(bottom, loc="upper left", bbox_to_anchor=(1.01, 1.0), title="this deep or deeper")
     for axis in (top, bottom):
         _mark_toe(axis, entry)
     start, end = entry.x[0], _ends([entry])[1]
@@ -61,7 +61,7 @@ def overview_figure(found):
         axis.set_xlabel("x [m]")
     for axis in axes[:, 0]:
         axis.set_ylabel(f"P({found[0].depths[0].depth:.3g} m deep at x) [–]")
-    axes[0, 0].legend(loc="lower left")
+    _legend(axes[0, 0], loc="lower left")
     return figure
 
 
@@ -86,7 +86,7 @@ def _draw_surfaces(axis, entry, homogeneous, tint):
     axis.set_ylim(bottom=0.0)
     axis.set_ylabel("depth [m]")
     axis.set_title(f"{entry.label}, {entry.n} members")
-    axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    _legend(axis, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
 
 def _draw_curve(axis, entry, one, tint, dash, text, with_band=True):
@@ -110,6 +110,12 @@ def _finish_curves(axis, found):
     axis.set_yscale("log")
     axis.set_ylim(0.5 / max(entry.n for entry in found), 1.4)
     axis.set_xlabel("x [m]")
+
+
+def _legend(axis, **place):
+    """Of what was drawn, if anything was."""
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(**place)
 
 
 def _mark_toe(axis, entry):

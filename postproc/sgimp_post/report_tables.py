@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .ensemble import FLOAT_COLUMNS, INTEGER_COLUMNS, RUNOUTS, STATUS_TEXTS
 
+_OF_A_FIT = ("law", "n", "k", "log_likelihood", "aic", "bic", "wins", "p_value")
 _STATISTICS = (
     "n",
     "mean",
@@ -72,7 +73,7 @@ def _fits(case: dict) -> list:
     return [
         {
             "case": case["label"],
-            **{key: fit[key] for key in ("law", "n", "k", "log_likelihood", "aic", "bic")},
+            **{key: fit[key] for key in _OF_A_FIT},
             "parameters": " ".join(f"{key}={value!r}" for key, value in fit["parameters"].items()),
             "note": fit["note"],
         }

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from .ensemble import RUNOUTS
-from .fits import LAWS
+from .fits import LAWS, rivals
+from .law_choice import FEWEST_FOR_BOOTSTRAP, LEVEL, LawChoice
 
 
 def verdict(summary: dict) -> list:
@@ -78,6 +79,8 @@ def _case_sentence(case: dict, summary: dict) -> str:
         text += f"; best law {LAWS[case['best']]}"
         if case["rivals"]:
             text += f", not told apart from {', '.join(LAWS[law] for law in case['rivals'])}"
+        if case["law_is_refuted"]:
+            text += ", but the members speak against it"
     return text + "."
 
 
@@ -115,6 +118,9 @@ def _study_sentence(summary: dict) -> str:
     if best:
         counts = sorted(((best.count(law), LAWS[law]) for law in set(best)), reverse=True)
         text += "; best law " + ", ".join(f"{law} in {n}" for n, law in counts)
+        refuted = sum(case["law_is_refuted"] for case in rows)
+        if refuted:
+            text += f" (in {refuted} of these cases the members speak against it)"
     return text + "."
 
 
@@ -211,3 +217,25 @@ def _named(labels: list, summary: dict) -> str:
     """These cases; in one phrase if they are all."""
     count = len(summary["cases"])
     return f"all {count} cases" if len(labels) == count > 3 else ", ".join(labels)
+
+
+def law_sentence(choice: LawChoice) -> str:
+    """The chosen law and what is to be thought of it, in one sentence."""
+    if not choice.law:
+        return "No law could be fitted."
+    best = next(fit for fit in choice.fits if fit.law == choice.law)
+    text = f"{LAWS[best.law]} fits best (Akaike weight {best.weight:.2f}"
+    if choice.wins:
+        text += f", best in {100 * choice.wins[best.law]:.0f} % of the resamples"
+    text += ")"
+    close = rivals(choice.fits)
+    if close:
+        text += ", not told apart from " + ", ".join(LAWS[fit.law] for fit in close)
+    if not choice.p_value:
+        return text + f"; fewer than {FEWEST_FOR_BOOTSTRAP} members say no more."
+    p = choice.p_value[best.law]
+    passing = [LAWS[law] for law, value in choice.p_value.items() if value >= LEVEL]
+    if not choice.is_refuted:
+        return text + f"; the members do not speak against it (p = {p:.2g})."
+    others = f"not against {', '.join(passing)}" if passing else "as against every other law here"
+    return text + f"; but the members speak against it (p = {p:.2g}), {others}."
