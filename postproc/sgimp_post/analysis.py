@@ -190,5 +190,5 @@ def _cost(ensemble) -> dict:
         "steps": asdict(describe(steps)),
         "starts": len(starts),
         "rank_hours": spent / 3600.0,
-        "busy_share": min(1.0, busy / spent) if spent >= FEWEST_SECONDS else np.nan,
+        "busy_share": busy / spent if spent >= FEWEST_SECONDS else np.nan,
     }

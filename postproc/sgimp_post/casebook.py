@@ -13,7 +13,7 @@ import numpy as np
 from . import __version__
 from .casebook_figures import animate, shared_view, still_figure
 from .casebook_frames import Track, frame_steps, frame_times, shared_quantities, survey
-from .ensemble import RUNOUTS, read_ensemble
+from .ensemble import FILE_NAME, RUNOUTS, read_ensemble
 from .errors import PostError
 from .member_section import member_entries
 from .member_states import CASEBOOK, varied_property
@@ -75,6 +75,8 @@ def run(options) -> int:
         return 0
     program = find_program(options.sgimp)
     out = Path(options.out) if options.out else Path(options.directory) / CASEBOOK
+    if (out / FILE_NAME).exists():
+        raise PostError(f"{out}: holds results of a run; --out names a directory for the casebook")
     gallery, chapters = Gallery(), []
     try:
         out.mkdir(parents=True, exist_ok=True)

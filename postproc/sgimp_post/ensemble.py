@@ -214,14 +214,16 @@ class Ensemble:
 
 
 def most_variable(cases: list, most: int) -> list:
-    """Of each autocorrelation function the first case of the largest cov, `most` in all: where the
-    soil varies most, it shows most."""
-    strongest = {}
-    for case in cases:
-        known = strongest.get(case.acf)
-        if known is None or case.cov > known.cov:  # NaN, of a spread given otherwise, has no order
-            strongest[case.acf] = case
-    return list(strongest.values())[:most]
+    """`most` of the cases, in their order: of each autocorrelation function the one of the largest
+    cov, where the soil shows most, before a second one of any. A cov that is not a number, of a
+    spread given otherwise, counts as none."""
+    rank, seen = {}, {}
+    for case in sorted(cases, key=lambda case: -np.nan_to_num(case.cov)):
+        seen[case.acf] = seen.get(case.acf, 0) + 1
+        rank[case.label] = seen[case.acf]
+    chosen = sorted(cases, key=lambda case: rank[case.label])[:most]
+    labels = {case.label for case in chosen}
+    return [case for case in cases if case.label in labels]
 
 
 def read_ensemble(directory: Path) -> Ensemble:

@@ -13,12 +13,12 @@ DARKEST = 0.45
 
 def heat_tables(summary: dict) -> list:
     """Of mean and standard deviation in m and P(S > homogeneous mean): title, digits, covs, rows
-    [(name, cells)]; a cell is value, half width of its 95 % interval, and shade, None where there
-    is no such case."""
+    [(name, cells)]; a cell is value, low and high of its 95 % interval, and shade, None where
+    there is no such case."""
     name, cases = summary["primary"], summary["cases"]
-    covs = sorted({case["cov"] for case in cases})
+    covs = sorted({_cov(case) for case in cases})
     names = list(dict.fromkeys(_row_name(case) for case in cases))
-    at = {(_row_name(case), case["cov"]): case for case in cases}
+    at = {(_row_name(case), _cov(case)): case for case in cases}
     tables = []
     for title, digits, estimate in (
         ("mean [m]", 3, lambda case: _of(case["runouts"][name], "mean")),
@@ -26,10 +26,10 @@ def heat_tables(summary: dict) -> list:
         ("P(S > homogeneous)", 2, lambda case: _share(case["against_floor"][name])),
     ):
         grid = [
-            [estimate(at[row, cov]) if (row, cov) in at else (math.nan, math.nan) for cov in covs]
+            [estimate(at[row, cov]) if (row, cov) in at else (math.nan,) * 3 for cov in covs]
             for row in names
         ]
-        shades = _shades(np.array([[value for value, _ in cells] for cells in grid]))
+        shades = _shades(np.array([[cell[0] for cell in cells] for cells in grid]))
         rows = [
             (row, [_cell(*cell, shade) for cell, shade in zip(cells, shades_of_row)])
             for row, cells, shades_of_row in zip(names, grid, shades)
@@ -38,21 +38,27 @@ def heat_tables(summary: dict) -> list:
     return tables
 
 
+def _cov(case: dict) -> float:
+    """0 of a spread that is given otherwise."""
+    return case["cov"] if math.isfinite(case["cov"]) else 0.0
+
+
 def _row_name(case: dict) -> str:
     return " ".join([case["acf"].upper(), *(f"{k}={v}" for k, v in case["varied"].items())])
 
 
 def _of(row: dict, key: str):
-    return row[key], 0.5 * (row[f"{key}_high"] - row[f"{key}_low"])
+    return row[key], row[f"{key}_low"], row[f"{key}_high"]
 
 
 def _share(against: dict):
     e = against["exceedance"]
-    return e["share"]["value"], 0.5 * (e["high"] - e["low"])
+    return e["share"]["value"], e["low"], e["high"]
 
 
-def _cell(value: float, half: float, shade: float) -> dict:
-    return {"value": value, "half": half, "shade": shade if math.isfinite(shade) else None}
+def _cell(value: float, low: float, high: float, shade: float) -> dict:
+    shade = shade if math.isfinite(shade) else None
+    return {"value": value, "low": low, "high": high, "shade": shade}
 
 
 def _shades(values: np.ndarray) -> np.ndarray:

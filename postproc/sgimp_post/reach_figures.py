@@ -37,14 +37,14 @@ def reach_figure(entry, homogeneous=None):
 def overview_figure(found):
     """P(so deep or deeper at x) of all cases for the least depth where it falls from one to zero,
     one panel a coefficient of variation."""
-    covs = sorted({entry.cov for entry in found})
+    covs = sorted({float(np.nan_to_num(entry.cov)) for entry in found})
     columns = min(3, len(covs))
     rows = -(-len(covs) // columns)
     figure, axes = plt.subplots(
         rows, columns, figsize=(11.5, 3.0 * rows + 0.5), sharex=True, sharey=True, squeeze=False
     )
     for axis, cov in zip(axes.flat, covs):
-        mine = [entry for entry in found if entry.cov == cov]
+        mine = [entry for entry in found if np.nan_to_num(entry.cov) == cov]
         for entry in mine:
             same = [e.label for e in mine if e.acf == entry.acf]
             dash = _DEPTH_LINES[min(same.index(entry.label), 2)]
@@ -52,7 +52,7 @@ def overview_figure(found):
             _draw_curve(
                 axis, entry, entry.depths[0], acf_colour(entry.acf), dash, text, len(mine) <= 3
             )
-        axis.set_title(f"COV {cov:g}" if np.isfinite(cov) else "")
+        axis.set_title(f"COV {cov:g}" if cov > 0.0 else "")
     for axis in axes.flat[len(covs) :]:
         axis.axis("off")
     _finish_curves(axes[0, 0], found)
@@ -71,7 +71,7 @@ def _draw_surfaces(axis, entry, homogeneous, tint):
         axis.add_patch(
             Rectangle(
                 (g.toe - g.initial_width, 0.0), g.initial_width, g.initial_height,
-                fc="none", ec="#8795A1", lw=0.9, label="before",
+                fc="none", ec="#8795A1", lw=0.9, label="box of the body before",
             )
         )  # fmt: skip
         axis.set_ylim(0.0, 1.04 * g.initial_height)

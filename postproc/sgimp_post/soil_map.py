@@ -25,8 +25,8 @@ from .two_level import MOST_DENSE, SAME
 FALSE_SHARE = 0.05
 #: Fewest members for a map: two halves of twenty.
 FEWEST = 40
-#: Maps of a study at most, of the case with the largest cov of each autocorrelation function.
-MOST_MAPS = 6
+#: Cases of a study that have maps, at most.
+MOST_MAPS = 5
 #: Blocks at most: coefficients of a linear model that some hundred members can bear.
 MOST_BLOCKS = 25
 #: Members for each coefficient of a linear model, at least.
@@ -128,8 +128,8 @@ class SoilMap:
 
 
 def soil_maps(ensemble, name: str):
-    """(maps, sentences on what has none) for the runout `name`: of a study the case with the
-    largest cov of each autocorrelation function, MOST_MAPS at most, a map for each field."""
+    """(maps, sentences on what has none) for the runout `name`: of a study the
+    MOST_MAPS cases whose soil varies most, a map for each field."""
     cases = [case for case in ensemble.for_statistics() if case.role == "study"]
     sampling = str(ensemble.attributes.get("sampling", ""))
     if not cases:

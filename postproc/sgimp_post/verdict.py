@@ -183,19 +183,38 @@ def warnings(summary: dict) -> list:
             f" {floor['sd']:.3f} m: more homogeneous members (noise_members) are needed before a"
             " spread is called noise."
         )
-    inside = [case["label"] for case in summary["cases"] if case["shift_below_noise"]]
-    if inside:
+    return found + _noise_warnings(summary)
+
+
+def _noise_warnings(summary: dict) -> list:
+    """What of the findings a single run would not show, and what of the spread is no soil."""
+    name, found = summary["primary"], []
+    shifts = {case["label"]: case["against_floor"][name]["shift"] for case in summary["cases"]}
+    open_ = [label for label, shift in shifts.items() if shift["low"] <= 0.0 <= shift["high"]]
+    if open_:
         found.append(
-            "The mean differs from homogeneous ground by less than the noise floor in: "
-            + _named(inside, summary)
-            + ". Such a difference is not a finding."
+            "The mean is not told from that of homogeneous ground (95 %) in: "
+            + _named(open_, summary)
+            + "."
+        )
+    small = [
+        case["label"]
+        for case in summary["cases"]
+        if case["shift_below_noise"] and case["label"] not in open_
+    ]
+    if small:
+        found.append(
+            "The mean is told from that of homogeneous ground, but differs by less than one run"
+            " scatters by (the noise floor), in: " + _named(small, summary) + "."
         )
     pairs = [pair for pair in summary["pairs"] if pair["n"] and pair["by"] == "acf"]
     if pairs and all(pair["below_noise"] for pair in pairs):
+        told = sum(pair["p_adjusted"] < LEVEL for pair in pairs)
         found.append(
             "All paired differences between autocorrelation functions are smaller than the noise"
             f" floor (largest {max(abs(pair['mean']) for pair in pairs):.3f} m against"
-            f" {max(pair['noise'] for pair in pairs):.3f} m)."
+            f" {max(pair['noise'] for pair in pairs):.3f} m); {told} of {len(pairs)} are told from"
+            " zero."
         )
     noisy = [case for case in summary["cases"] if case["noise_share"] > 0.5]
     if noisy:

@@ -115,6 +115,13 @@ def test_shown_cases_are_of_all_functions_and_of_the_largest_cov(tmp_path):
     assert case.label == "deterministic"
 
 
+def test_a_casebook_does_not_go_where_a_run_is(tmp_path, capsys):
+    """It would put its replays where the snapshots of the run are."""
+    case_of(tmp_path, [5.0, 6.0])
+    assert main(["casebook", str(tmp_path), "--out", str(tmp_path), "--sgimp", "true"]) == 2
+    assert "holds results of a run" in capsys.readouterr().err
+
+
 def test_a_running_sweep_shows_members_of_its_prefix(tmp_path):
     """Member 5 has run farthest, but 4 is still missing: the slow ones are."""
     case = {"label": "base", "acf": "snx", "values": [5.0, 6.0, 5.5, 9.0], "ids": [1, 2, 3, 5]}

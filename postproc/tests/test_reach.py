@@ -9,8 +9,8 @@ from synthetic import COLUMNS_X, write_ensemble
 
 from sgimp_post import reach_figures
 from sgimp_post.ensemble import Geometry, read_ensemble
+from sgimp_post.page import environment
 from sgimp_post.reach import depths_of_interest, distance, reaches, tables, weighted_distance
-from sgimp_post.report import _environment
 from sgimp_post.statistics import wilson
 from sgimp_post.style import rendered
 
@@ -212,7 +212,7 @@ def test_pictures_and_page_show_what_is_there(tmp_path, sampling):
     assert "x [m]" in svg and "depth [m]" in svg and "homogeneous" in svg and len(svg) < 150_000
     assert ("5 to 95 %" in svg) == (sampling == "random")
     assert "COV 0.1" in rendered(reach_figures.overview_figure(found)).decode()
-    page = _environment().get_template("reach.html.j2")
+    page = environment().get_template("reach.html.j2")
     html = page.render(reaches=found, reach_figures={"snx_cov0.10": "data:x"}, reach_overview=None)
     assert "one layer of points" in html and 'src="data:x"' in html
     assert ("Members are weighted" in html) == (sampling == "importance")
@@ -220,8 +220,8 @@ def test_pictures_and_page_show_what_is_there(tmp_path, sampling):
 
 
 def test_the_page_needs_nothing_that_is_not_given(tmp_path):
-    environment = _environment()
-    environment.undefined = jinja2.StrictUndefined
+    templates = environment()
+    templates.undefined = jinja2.StrictUndefined
     found = reaches(run(tmp_path / "r", np.repeat([14, 18], 10)))
-    page = environment.get_template("reach.html.j2")
+    page = templates.get_template("reach.html.j2")
     assert page.render(reaches=found, reach_figures={}, reach_overview=None)
