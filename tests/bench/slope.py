@@ -4,7 +4,7 @@
 
 RUN is the directory of the run, finished or not. A slope has failed when its farthest point is more than `failed`
 metres before the initial toe. Prints the table of input/slope/README.md: probabilities with their Wilson intervals,
-quantiles of those that failed with the intervals of order statistics (Hahn & Meeker 1991), which hold for any law. The
+distances that a share of those that failed pass with the intervals of order statistics, which hold for any law. The
 picture shows the members that have snapshots, from the shortest runout to the longest.
 """
 
@@ -13,22 +13,14 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.stats import binom
 from sgimp_post.ensemble import read_ensemble
+from sgimp_post.reach import distance
 from sgimp_post.snapshots import find_snapshots, list_steps, read_point_states
 from sgimp_post.statistics import probability_above
 from sgimp_post.style import rendered, styled
 
 BEYOND = (2.0, 4.0, 6.0)
 RUNOUTS = {"runout_max": "farthest point", "runout_connected": "connected deposit"}
-
-
-def quantile_interval(values, share, confidence=0.95):
-    """Order statistics that hold the quantile with at least this confidence; NaN where there are too few values."""
-    x, n = np.sort(values), len(values)
-    tail = 0.5 * (1.0 - confidence)
-    low, high = int(binom.ppf(tail, n, share)), int(binom.ppf(1.0 - tail, n, share)) + 1
-    return (x[low - 1] if low > 0 else np.nan), (x[high - 1] if high <= n else np.nan)
 
 
 def print_table(case, failed):
@@ -42,10 +34,10 @@ def print_table(case, failed):
         print(f"| {text} | {p.value:.3f} | {p.low:.3f} to {p.high:.3f} |")
     for name, text in RUNOUTS.items():
         reach = case.column(name)[case.ok][fails]
-        for share in (0.5, 0.9) if len(reach) else ():
-            low, high = quantile_interval(reach, share)
-            value = np.quantile(reach, share)
-            print(f"| {text} if it fails, {share:.0%} quantile, m | {value:.2f} | {low:.2f} to {high:.2f} |")
+        for share in (0.5, 0.1) if len(reach) else ():
+            d = distance(reach, share)
+            high = f"to {d.high:.2f}" if np.isfinite(d.high) else "or more"
+            print(f"| {text} that {share:.0%} of those that fail pass, m | {d.value:.2f} | {d.low:.2f} {high} |")
     at_rest = case.column("settled")[case.ok] > 0
     for text, group in (("fail", fails), ("stand", ~fails)):
         print(f"| of {group.sum()} that {text}, at rest by the rule of `settle` | {at_rest[group].sum()} | |")
