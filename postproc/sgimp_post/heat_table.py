@@ -12,8 +12,8 @@ DARKEST = 0.45
 
 
 def heat_tables(summary: dict) -> list:
-    """Of mean and standard deviation in m and P(S > homogeneous mean): title, digits, covs, rows
-    [(name, cells)]; a cell is value, low and high of its 95 % interval, and shade, None where
+    """Of mean and standard deviation (sd) in m and P(S > homogeneous mean): title, digits, covs,
+    rows [(name, cells)]; a cell is value, low and high of its 95 % interval, and shade, None where
     there is no such case."""
     name, cases = summary["primary"], summary["cases"]
     covs = sorted({_cov(case) for case in cases})
@@ -22,7 +22,7 @@ def heat_tables(summary: dict) -> list:
     tables = []
     for title, digits, estimate in (
         ("mean [m]", 3, lambda case: _of(case["runouts"][name], "mean")),
-        ("standard deviation [m]", 3, lambda case: _of(case["runouts"][name], "sd")),
+        ("sd [m]", 3, lambda case: _of(case["runouts"][name], "sd")),
         ("P(S > homogeneous)", 2, lambda case: _share(case["against_floor"][name])),
     ):
         grid = [
