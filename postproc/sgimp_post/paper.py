@@ -14,6 +14,7 @@ from .diff import compare_runs, has_same_numbers
 from .ensemble import RUNOUTS, Ensemble
 from .errors import PostError
 from .fits import PARAMETERS, best_fit, fit_laws
+from .law_choice import LEVEL as REFUTED
 from .law_choice import choose_law
 from .namelist import by_key, differing_keys, read_namelist, resolved_text
 from .noise_floor import noise_floor
@@ -23,9 +24,12 @@ from .statistics import (
     CONFIDENCE,
     describe,
     holm,
+    paired_difference,
     probability_above,
     probability_above_mean,
     sd_error,
+    sd_interval,
+    variance_ratio,
     welch_difference,
 )
 from .two_samples import compare
@@ -42,6 +46,11 @@ NO_SHARE = (1.0 - float(np.exp(-np.exp(-np.euler_gamma))), 0.5)
 #: Keys in which runs may differ without another result.
 _IDLE_GROUPS = ("case", "output", "study")
 _IDLE_KEYS = ("monte_carlo(1)%realizations", "monte_carlo(1)%noise_members")
+
+
+def together(count: int) -> float:
+    """Level at which `count` intervals hold CONFIDENCE all at once (Bonferroni)."""
+    return 1.0 - (1.0 - CONFIDENCE) / count
 
 
 def in_decimetres(ensemble: Ensemble) -> Ensemble:
@@ -85,6 +94,7 @@ def compare_with_paper(ensemble: Ensemble, others: list, name: str) -> dict:
         "directory": ensemble.directory.name,
         "state": ensemble.state,
         "totals": summary["totals"],
+        "sampling": summary["sampling"],
         "settings": settings(ensemble),
         "missing": [
             f"{acf} at COV {cov:.2f}" for acf in ACFS for cov in COVS if (acf, cov) not in there
@@ -93,7 +103,7 @@ def compare_with_paper(ensemble: Ensemble, others: list, name: str) -> dict:
         "settle_time": _settle_time(ensemble, summary),
         "seconds": summary["cost"]["seconds"],
         "cases": [
-            _row(case, homogeneous[case.label], word, len(_at(cases, case.cov)))
+            _row(case, homogeneous[case.label], word, together(len(_at(cases, case.cov))))
             for case in cases
             for word in RUNOUTS
         ],
@@ -105,13 +115,13 @@ def compare_with_paper(ensemble: Ensemble, others: list, name: str) -> dict:
         "laws": [_laws(case, name) for case in baseline if len(case.values(name))],
         "blocks": [row for case in baseline for row in block_winners(case.acf, case.values(name))],
         "convergence": [
-            {"acf": case.acf, **convergence(case.values(name))}
+            {"acf": case.acf, **convergence(case.values(name), together(2 * len(baseline)))}
             for case in baseline
             if len(case.values(name)) > 1
         ],
         "fronts": _fronts(baseline, ensemble.geometry.toe),
         "shapes": shapes(),
-        "sensitivities": [_sensitivity(ensemble, one, name) for one in others],
+        "sensitivities": [_sensitivity(ensemble, one) for one in others],
     }
 
 
@@ -171,8 +181,8 @@ def implied_sd(aic: float, n: float) -> float:
 
 def implied() -> list:
     """Of each row of Table 5: N; `s`, the standard deviation over N, and `sd`, over N - 1, with the
-    interval that so many values of Gumbel's law give it (Bonett); P(S > 60.03 dm) by Gumbel's law
-    of that mean and spread."""
+    interval that so many values of Gumbel's law give it (Bonett), alone and `together_` with the
+    other rows; P(S > 60.03 dm) by Gumbel's law of that mean and spread."""
     found = []
     for acf, laws in TABLE_5.items():
         counts = [implied_count(*pair) for pair in laws.values()]
@@ -180,7 +190,13 @@ def implied() -> list:
         s = implied_sd(laws["normal"][0], n)
         sd = s * np.sqrt(n / (n - 1.0))
         c, error = sd_error(n, _GUMBEL_KURTOSIS)
-        half = 0.5 * stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) * error
+        ends = {
+            f"{word}sd_{end}": float(
+                sd * np.sqrt(c) * np.exp(0.5 * sign * stats.norm.ppf(0.5 + 0.5 * level) * error)
+            )
+            for word, level in (("", CONFIDENCE), ("together_", together(len(TABLE_5))))
+            for end, sign in (("low", -1.0), ("high", 1.0))
+        }
         found.append(
             {
                 "acf": acf,
@@ -191,8 +207,7 @@ def implied() -> list:
                 "mean_error": float(sd / np.sqrt(n)),
                 "s": s,
                 "sd": float(sd),
-                "sd_low": float(sd * np.sqrt(c) * np.exp(-half)),
-                "sd_high": float(sd * np.sqrt(c) * np.exp(half)),
+                **ends,
                 "exceedance": float(gumbel_of(MEANS[acf], sd).sf(NUMBERS["homogeneous"].value)),
             }
         )
@@ -208,13 +223,12 @@ def gumbel_of(mean: float, sd: float):
 # What the members say
 
 
-def _row(case, homogeneous, name: str, together: int) -> dict:
-    """Of a case and a runout. `together_`: intervals that hold for all `together` functions at once
-    (Bonferroni), which a statement about all of them needs."""
+def _row(case, homogeneous, name: str, level: float) -> dict:
+    """Of a case and a runout. `together_`: intervals of that level, which hold for all functions at
+    once, as a statement about all of them needs."""
     values = case.values(name)
     noise = np.array([]) if homogeneous is None else homogeneous.values(name)
-    own = describe(values)
-    level = 1.0 - (1.0 - CONFIDENCE) / together
+    own, all_sds = describe(values), sd_interval(values, level)
     shift, all_shifts = (welch_difference(values, noise, c) for c in (CONFIDENCE, level))
     share, all_shares = (probability_above_mean(values, noise, c) for c in (CONFIDENCE, level))
     floor = noise_floor(homogeneous)[name]
@@ -228,6 +242,8 @@ def _row(case, homogeneous, name: str, together: int) -> dict:
         "n": own.n,
         **{key: getattr(own, key) for key in ("mean", "mean_low", "mean_high")},
         **{key: getattr(own, key) for key in ("sd", "sd_low", "sd_high", "minimum", "maximum")},
+        "together_sd_low": all_sds[0],
+        "together_sd_high": all_sds[1],
         "noise_sd": floor["sd"],
         "shift": shift.mean,
         "shift_low": shift.low,
@@ -254,9 +270,11 @@ def wall_runout() -> float:
 
 def _pairs(cases, homogeneous, name: str) -> list:
     """Paired differences of functions at each coefficient of variation, and of neighbouring
-    coefficients of each function; p adjusted among those of a kind (Holm)."""
+    coefficients of each function; p adjusted among those of a kind (Holm). `together_`: intervals
+    that hold for all pairs of functions of a coefficient at once."""
     noise = {label: noise_floor(case)[name]["sd"] for label, case in homogeneous.items()}
     by_label = {case.label: case for case in cases}
+    level = together(len(ACFS) * (len(ACFS) - 1) // 2)
     found = []
     for row in paired_experiments(cases, name, noise):
         first, second = by_label[row["first"]], by_label[row["second"]]
@@ -268,6 +286,7 @@ def _pairs(cases, homogeneous, name: str) -> list:
                 low=-row["high"],
                 high=-row["low"],
             )
+        wide = paired_difference(*paired_values(first, second, name), level)
         found.append(
             {
                 "runout": name,
@@ -276,6 +295,8 @@ def _pairs(cases, homogeneous, name: str) -> list:
                 "cov": max(first.cov, second.cov),
                 "other_cov": min(first.cov, second.cov),
                 **row,
+                "together_low": wide.low,
+                "together_high": wide.high,
             }
         )
     return found
@@ -332,7 +353,8 @@ def table_5_rows(acf: str, values) -> list:
 
 
 def _laws(case, name: str) -> dict:
-    """Best law of all members, by how much, and the p value of each law against them."""
+    """Best law of all members, by how much, and the p value of each law against them; `least_p` is
+    the least that so many samples can give."""
     choice = choose_law(case.values(name), _SAMPLES, np.random.default_rng(case.order))
     return {
         "acf": case.acf,
@@ -340,6 +362,8 @@ def _laws(case, name: str) -> dict:
         "best": choice.law,
         "delta_aic": {fit.law: fit.delta_aic for fit in choice.fits},
         "p_value": choice.p_value,
+        "least_p": 1.0 / (1.0 + _SAMPLES),
+        "none_fits": bool(choice.is_refuted and max(choice.p_value.values()) < REFUTED),
     }
 
 
@@ -370,12 +394,15 @@ def block_winners(acf: str, values) -> list:
     return found
 
 
-def convergence(values) -> dict:
-    """Mean and spread after the paper's 700 members and after all; the first member at which its
-    rule holds (mean and variance both change by less than 1e-3, in dm and dm^2), and how well the
-    mean is known there. NaN where there are not so many."""
+def convergence(values, level: float = CONFIDENCE) -> dict:
+    """Mean and spread after the paper's 700 members and after all, and those of the later members
+    against the first 700, with intervals of that level; the first member at which its rule holds
+    (mean and variance both change by less than 1e-3, in dm and dm^2), and how well the mean is
+    known there. NaN where there are not so many."""
     early, final = NUMBERS["converged"].value, describe(values)
-    then = describe(values[:early] if len(values) > early else [])
+    first, later = values[:early] if len(values) > early else [], values[early:]
+    then, shift = describe(first), welch_difference(later, first, level)
+    ratio = variance_ratio(later, first, level)
     count = np.arange(1, len(values) + 1)
     mean = np.cumsum(values) / count
     squares = np.cumsum((values - values.mean()) ** 2) / count
@@ -397,6 +424,13 @@ def convergence(values) -> dict:
         "early_sd": then.sd,
         "early_sd_low": then.sd_low,
         "early_sd_high": then.sd_high,
+        "later_n": len(later),
+        "later_shift": shift.mean,
+        "later_shift_low": shift.low,
+        "later_shift_high": shift.high,
+        "later_sd_ratio": float(np.sqrt(ratio.value)),
+        "later_sd_ratio_low": float(np.sqrt(ratio.low)),
+        "later_sd_ratio_high": float(np.sqrt(ratio.high)),
         "rule_n": met,
         "rule_mean": stopped.mean,
         "rule_half_width": stopped.half_width,
@@ -467,7 +501,7 @@ def shapes() -> list:
     return found
 
 
-def _sensitivity(ensemble: Ensemble, other: Ensemble, name: str) -> dict:
+def _sensitivity(ensemble: Ensemble, other: Ensemble) -> dict:
     """`other` less `ensemble`, member by member where labels and random numbers agree."""
     first, second = (by_key(read_namelist(*resolved_text(one))) for one in (ensemble, other))
     changed = {}
@@ -525,7 +559,7 @@ def _sensitivity(ensemble: Ensemble, other: Ensemble, name: str) -> dict:
         "changed": list(changed.values()),
         "settings": settings(other),
         "has_same_numbers": has_same_numbers(ensemble, other),
-        "homogeneous": _homogeneous(other)[name],
+        "homogeneous": _homogeneous(other),
         "rows": rows,
     }
 

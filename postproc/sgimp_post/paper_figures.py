@@ -155,9 +155,11 @@ def density_figure(cases, name: str, homogeneous: dict, implied: list):
     deviations beside the paper's."""
     figure, axes = plt.subplots(1, 2, figsize=(11.5, 3.7), width_ratios=[1.6, 1.0])
     own = {row["acf"]: row for row in implied}
-    x = np.linspace(45.0, 95.0, 700)
-    for acf in ACFS:
-        law = gumbel_of(MEANS[acf], own[acf]["sd"])
+    printed = {acf: gumbel_of(MEANS[acf], own[acf]["sd"]) for acf in ACFS}
+    ends = [law.ppf([0.005, 0.995]) for law in printed.values()]
+    ends += [[values.min(), values.max()] for values in (case.values(name) for case in cases)]
+    x = np.linspace(np.min(ends) - 1.0, np.max(ends) + 1.0, 700)
+    for acf, law in printed.items():
         axes[0].plot(x, law.pdf(x), color=acf_colour(acf), lw=1.1, ls=":")
     for case in cases:
         fit = next(fit for fit in fit_laws(case.values(name)) if fit.law == "gumbel")

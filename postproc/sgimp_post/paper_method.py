@@ -3,11 +3,12 @@ verdict; and how its gaps are read."""
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
-from .diff import LEVEL
 from .fits import LAWS, UNDECIDED
-from .paper import BLOCK, wall_runout, wave_speed
+from .paper import BLOCK
 from .paper_verdicts import (
     DOES_NOT,
     NONE_YET,
@@ -16,41 +17,23 @@ from .paper_verdicts import (
     Statement,
     floor_text,
     for_all,
+    judge,
     of_all,
-    rows_of,
-    shown,
+    p_text,
+    spans,
 )
-from .printed import ACFS, COVS, NUMBERS, TABLE_5
+from .printed import COVS, NUMBERS
 
 
 def statements(n: dict) -> list:
     """Of the numbers of `compare_with_paper`."""
     return [
-        _count(n),
         _best_law(n),
-        _luck_of_hundred(n),
         _converged(n),
         _rule(n),
-        _time_step(n),
-        _wall(n),
         _isotropic(n),
         _clipped(n),
     ]
-
-
-def _count(n) -> Statement:
-    rows = n["implied"]
-    low, high = min(r["n_low"] for r in rows), max(r["n_high"] for r in rows)
-    members = NUMBERS["members"].value
-    return Statement(
-        "count",
-        "4.2; 4.2.2; Table 5",
-        f"Each case has {members} realizations",
-        {"": DOES_NOT if not low <= members <= high else REPRODUCES},
-        f"BIC − AIC in each row of Table 5 says N = {low:.1f} to {high:.1f}",
-        f"BIC − AIC = 2 ln N − 4; and {len(TABLE_5)} functions x {len(COVS)} COVs x {members} are"
-        f" not the {NUMBERS['simulations'].value} of section 4.2.2",
-    )
 
 
 def _best_law(n) -> Statement:
@@ -60,65 +43,46 @@ def _best_law(n) -> Statement:
             return REPRODUCES if lead >= UNDECIDED else OPEN
         return DOES_NOT if row["delta_aic"]["gumbel"] >= UNDECIDED else OPEN
 
-    laws = [row for row in n["laws"] if row["best"]]
+    laws, numbers = [row for row in n["laws"] if row["best"]], NONE_YET
     texts = [
         f"{row['acf'].upper()} {LAWS[row['best']]} (Gumbel: ΔAIC {row['delta_aic']['gumbel']:.1f},"
-        f" p {shown(row['p_value'].get('gumbel', np.nan), '.3f')})"
+        f" p {p_text(row['p_value'].get('gumbel', np.nan), row['least_p'])})"
         for row in laws
     ]
+    if laws:
+        numbers = f"of {min(row['n'] for row in laws)} and more members: {'; '.join(texts)}"
+        hopeless = [row["acf"].upper() for row in laws if row["none_fits"]]
+        if hopeless:
+            numbers += f"; best of the four, but none fits: {', '.join(hopeless)}"
     return Statement(
         "best_law",
         "4.2.1, Table 5",
         "Gumbel's law fits best with every function",
         {n["runout"]: for_all(laws, verdict)},
-        f"of {min(r['n'] for r in laws)} and more members: {'; '.join(texts)}"
-        if laws
-        else NONE_YET,
+        numbers,
         f"laws within {UNDECIDED:g} in AIC cannot be told apart; p: Anderson and Darling's test of"
         " whether the members can be of the law at all",
     )
 
 
-def _luck_of_hundred(n) -> Statement:
-    blocks, numbers, verdict = n["blocks"], NONE_YET, OPEN
-    if blocks:
-        wins = {law: sum(b["best"] == law for b in blocks) for law in LAWS}
-        won = ", ".join(f"{LAWS[law]} {count}" for law, count in wins.items() if count)
-        share = wins["gumbel"] / len(blocks)
-        numbers = f"{len(blocks)} hundreds: {won}"
-        by_acf = [sum(b["best"] == "gumbel" for b in blocks if b["acf"] == acf) for acf in ACFS]
-        numbers += "; Gumbel by function: "
-        numbers += ", ".join(
-            f"{acf.upper()} {won_}/{sum(b['acf'] == acf for b in blocks)}"
-            for acf, won_ in zip(ACFS, by_acf)
-        )
-        if len({b["acf"] for b in blocks}) == len(ACFS):
-            verdict = REPRODUCES if share == 1.0 else DOES_NOT
-    return Statement(
-        "luck_of_hundred",
-        "Table 5",
-        f"With N = {BLOCK} any members would have told Gumbel's law",
-        {n["runout"]: verdict},
-        numbers,
-        "the members in order of id, a hundred at a time, each hundred a table of its own",
-    )
-
-
 def _converged(n) -> Statement:
-    rows = [row for row in n["convergence"] if row["early_n"]]
+    early = NUMBERS["converged"].value
+    rows = [row for row in n["convergence"] if row["later_n"] >= BLOCK]
 
     def verdict(row):
-        is_mean = abs(row["mean"] - row["early_mean"]) <= row["early_half_width"]
-        is_sd = row["early_sd_low"] <= row["sd"] <= row["early_sd_high"]
-        return REPRODUCES if is_mean and is_sd else DOES_NOT
+        return of_all(
+            judge(row[f"{key}_low"], row[f"{key}_high"], nothing, nothing)
+            for key, nothing in (("later_shift", 0.0), ("later_sd_ratio", 1.0))
+        )
 
-    numbers = f"fewer than {NUMBERS['converged'].value + 1} members"
+    numbers = f"fewer than {early + BLOCK} members"
     if rows:
         halves = [row["early_half_width"] for row in rows]
-        moved = max(abs(row["mean"] - row["early_mean"]) for row in rows)
         numbers = (
-            f"at {NUMBERS['converged'].value}: means ± {min(halves):.2f} to {max(halves):.2f} dm;"
-            f" they move by {moved:.2f} dm at most until the end"
+            f"at {early}: means ± {min(halves):.2f} to {max(halves):.2f} dm; the"
+            f" {min(row['later_n'] for row in rows)} and more members after: "
+            + spans(rows, "later_shift", "later_shift_low", "later_shift_high")
+            + " dm"
         )
     own = [row["sd"] for row in n["implied"]]
     half = 1.96 * max(own) / np.sqrt(NUMBERS["converged"].value)
@@ -128,8 +92,8 @@ def _converged(n) -> Statement:
         "Statistics have converged after about 700 simulations",
         {n["runout"]: for_all(rows, verdict)},
         numbers,
-        "mean and sd at the end within the interval at 700; with the paper's spread 700 members"
-        f" leave ± {half:.1f} dm",
+        f"the members after the first {early}, {BLOCK} at least, against those: mean (Welch) and sd"
+        f" (Shoemaker), all at once; with the paper's spread {early} members leave ± {half:.1f} dm",
     )
 
 
@@ -152,61 +116,6 @@ def _rule(n) -> Statement:
         {n["runout"]: verdict},
         numbers,
         "the change goes as s/N, the error as s/√N: the rule bounds no error",
-    )
-
-
-def _time_step(n) -> Statement:
-    cell, printed = NUMBERS["cell_size"].value, NUMBERS["time_step"].value
-    limit = cell / wave_speed()
-    own = n["settle_time"]["time_step"]
-    ours = f"; mean step here {own:.2e} s" if np.isfinite(own) else ""
-    return Statement(
-        "time_step",
-        NUMBERS["time_step"].place,
-        "The time increment is 2.0e-2 s",
-        {"": DOES_NOT if printed > limit else REPRODUCES},
-        f"c = {wave_speed():.2f} m/s, cells of {cell:g} m: CFL {printed / limit:.1f}, limit"
-        f" {limit:.1e} s{ours}",
-        "an explicit scheme cannot be stable there; perhaps a printing interval, or another unit",
-    )
-
-
-def _wall(n) -> Statement:
-    rows = rows_of(n, "runout_max")
-    wall, printed = wall_runout(), NUMBERS["range"].value[1]
-    numbers, verdict = NONE_YET, OPEN
-    if rows:
-        beyond, members = sum(r["beyond_wall"] for r in rows), sum(r["n"] for r in rows)
-        numbers = f"{beyond} of {members} members run {wall:.0f} dm or farther"
-        numbers += f", the farthest {max(r['maximum'] for r in rows):.1f} dm"
-        verdict = OPEN if beyond else DOES_NOT
-    found = [
-        (s["directory"], row)
-        for s in n["sensitivities"]
-        if s["settings"]["x_max"] is not None and np.isclose(s["settings"]["x_max"], 14.0)
-        for row in s["rows"]
-        if row["runout"] == n["runout"] and row["role"] == "study" and row["n"] > 1
-    ]
-    if found:
-        moved = [row for _, row in found if row["p_adjusted"] < LEVEL]
-        equal = sum(row["is_equal"] for _, row in found)
-        worst = max((row for _, row in found), key=lambda row: abs(row["shift"]))
-        numbers += (
-            f"; {found[0][0]}: {len(moved)} of {len(found)} cases shifted, {equal} equal to the"
-            f" last bit, largest shift {worst['shift']:+.2f} dm ({worst['shift_low']:+.2f} to"
-            f" {worst['shift_high']:+.2f})"
-        )
-        verdict = REPRODUCES if moved else DOES_NOT
-    return Statement(
-        "wall",
-        NUMBERS["nodes"].place,
-        "The grid of 10170 nodes ends at 14 m: its wall cuts runouts short",
-        {"": verdict},
-        numbers,
-        f"the wall stands at {wall:.0f} dm and the printed runouts end at {printed:.0f} dm: with"
-        " their spread it may have cut some, with ours it is not reached"
-        if verdict == DOES_NOT
-        else f"the wall stands at {wall:.0f} dm, the printed runouts end at {printed:.0f} dm",
     )
 
 
@@ -258,16 +167,9 @@ def _clipped(n) -> Statement:
 
 def readings(n: dict) -> list:
     """How the gaps of the paper are read: (printed, reading, this run)."""
-    keys, p = n["settings"], NUMBERS
-
-    def own(*names, unit=""):
-        known = [keys[name] for name in names if keys[name] is not None]
-        return ", ".join(f"{value:g}" if _is_number(value) else str(value) for value in known) + (
-            f" {unit}" if known and unit else ""
-        )
-
+    keys, own = n["settings"], partial(_setting, n["settings"])
     spacing = keys["point_spacing"]
-    count = round(p["width"].value / spacing) ** 2 if spacing else None
+    count = round(NUMBERS["width"].value / spacing) ** 2 if spacing else None
     nodes = None
     if keys["cell_size"] and keys["x_max"] and keys["y_max"]:
         nodes = 2 * np.prod([round(keys[k] / keys["cell_size"]) + 1 for k in ("x_max", "y_max")])
@@ -339,6 +241,13 @@ def readings(n: dict) -> list:
             ),
         ),
     ]
+
+
+def _setting(keys: dict, *names, unit="") -> str:
+    """Those of these keys that are known, with their unit."""
+    known = [keys[name] for name in names if keys[name] is not None]
+    text = ", ".join(f"{value:g}" if _is_number(value) else str(value) for value in known)
+    return f"{text} {unit}" if known and unit else text
 
 
 def _is_number(value) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 from . import (
     __version__,
     field_figures,
+    paper_consequences,
     paper_figures,
     paper_method,
     paper_runouts,
@@ -21,11 +22,13 @@ from .errors import PostError
 from .fits import LAWS
 from .page import environment
 from .paper import BLOCK, compare_with_paper, in_decimetres, paper_cases
+from .paper_verdicts import p_text
 from .printed import ACFS, BASELINE, NUMBERS
 from .random_fields import read_random_fields
 from .snapshots import find_snapshots, read_snapshot
 from .style import Gallery
 from .tables import null_for_nan, write_table
+from .verdict import dependence_sentence
 
 
 def run(options) -> int:
@@ -41,21 +44,23 @@ def write_comparison(directory: Path, others: list, output: Path, name: str) -> 
     beside = [in_decimetres(read_ensemble(other)) for other in others]
     numbers = compare_with_paper(ensemble, beside, name)
     found = [*paper_runouts.statements(numbers), *paper_method.statements(numbers)]
+    consequences = paper_consequences.statements(numbers)
     gallery = Gallery()
-    tables = _tables(numbers, found)
+    tables = _tables(numbers, found, consequences)
     values = {
         "n": numbers,
-        "statements": found,
+        "groups": {"verdicts": found, "consequences": consequences},
         "readings": paper_method.readings(numbers),
         "warnings": warnings(numbers),
-        "summary": summary(numbers, found),
+        "summary": summary(numbers, found, consequences),
         "a": ensemble.attributes,
         "runouts": RUNOUTS,
         "laws": LAWS,
         "acfs": ACFS,
         "printed": printed,
         "block": BLOCK,
-        "files": list(tables),
+        "p_text": p_text,
+        "files": [file for file, rows in tables.items() if rows],
         "post_version": __version__,
         **_figures(ensemble, beside, numbers, gallery),
     }
@@ -64,13 +69,23 @@ def write_comparison(directory: Path, others: list, output: Path, name: str) -> 
         "paper.html": templates.get_template("paper.html.j2").render(**values),
         "paper.md": templates.get_template("paper.md.j2").render(**values),
         "paper.json": json.dumps(
-            null_for_nan({**numbers, "statements": [asdict(one) for one in found]}), indent=1
+            null_for_nan(
+                {
+                    **numbers,
+                    "statements": [asdict(one) for one in found],
+                    "consequences": [asdict(one) for one in consequences],
+                }
+            ),
+            indent=1,
         ),
     }
     try:
         output.mkdir(parents=True, exist_ok=True)
         for file, rows in tables.items():
-            write_table(output / file, rows)
+            if rows:
+                write_table(output / file, rows)
+            else:  # that of an earlier call
+                (output / file).unlink(missing_ok=True)
         gallery.write(output / "figures")
         for file, text in pages.items():
             (output / file).write_text(text, encoding="utf-8")
@@ -79,18 +94,25 @@ def write_comparison(directory: Path, others: list, output: Path, name: str) -> 
     return output / "paper.html"
 
 
-def summary(numbers: dict, found: list) -> list:
+def summary(numbers: dict, found: list, consequences: list) -> list:
     """The answer in sentences."""
     name = numbers["runout"]
-    verdicts = [one.verdict(name) for one in found]
-    counts = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys(sorted(verdicts)))
-    lines = [f"{len(found)} statements of the paper: {counts} (runout: {RUNOUTS[name]})."]
+    lines = [
+        f"{len(found)} statements of the paper: {_counts(found, name)} (runout: {RUNOUTS[name]}).",
+        f"{len(consequences)} inconsistencies and consequences of its numbers, not counted there:"
+        f" {_counts(consequences, name)}.",
+    ]
     for key in ("underestimate_0.05", "functions_differ_0.05", "best_law"):
         one = next(one for one in found if one.key == key)
         lines.append(
             f"{one.claim}: {one.verdict(name)}. {one.numbers[:1].upper()}{one.numbers[1:]}."
         )
     return lines
+
+
+def _counts(found: list, name: str) -> str:
+    verdicts = [one.verdict(name) for one in found]
+    return ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys(sorted(verdicts)))
 
 
 def warnings(numbers: dict) -> list:
@@ -114,6 +136,8 @@ def warnings(numbers: dict) -> list:
             f"The run is {numbers['state']}: {totals['done']} of {totals['planned']} members are"
             f" done, {totals['used']} without a gap from the first on are used."
         )
+    if line := dependence_sentence(numbers["sampling"]):
+        found.append(line)
     if numbers["missing"]:
         found.append(f"Of the paper's 15 cases without members: {', '.join(numbers['missing'])}.")
     if floor["n"] == 0:
@@ -226,8 +250,8 @@ def _deposits(ensemble, baseline: list, gallery: Gallery) -> list:
     return sorted((one for one in found if one["image"]), key=lambda one: ACFS.index(one["acf"]))
 
 
-def _tables(numbers: dict, found: list) -> dict:
-    """Rows of the CSV files by name; of those only that have any."""
+def _tables(numbers: dict, found: list, consequences: list) -> dict:
+    """Rows of the CSV files by name."""
     name = numbers["runout"]
     laws = [
         {
@@ -240,9 +264,10 @@ def _tables(numbers: dict, found: list) -> dict:
         for row in numbers["laws"]
         for law, delta in row["delta_aic"].items()
     ]
-    tables = {
+    return {
         "verdicts.csv": [
             {
+                "group": group,
                 "key": one.key,
                 "place": one.place,
                 "claim": one.claim,
@@ -250,7 +275,8 @@ def _tables(numbers: dict, found: list) -> dict:
                 "numbers": one.numbers,
                 "why": one.why,
             }
-            for one in found
+            for group, members in (("statement", found), ("consequence", consequences))
+            for one in members
         ],
         "printed.csv": printed.rows(),
         "implied.csv": numbers["implied"],
@@ -268,4 +294,3 @@ def _tables(numbers: dict, found: list) -> dict:
             for row in one["rows"]
         ],
     }
-    return {file: rows for file, rows in tables.items() if rows}

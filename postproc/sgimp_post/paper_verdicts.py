@@ -5,7 +5,7 @@ A number is judged by an interval: it does not reproduce where the interval leav
 is printed; it cannot be told where the interval holds both what is printed and no effect at all; it
 reproduces otherwise. A statement about all cases reproduces if it does in each, and does not if it
 does not in one; the intervals then hold for all of them at once (Bonferroni), p values are adjusted
-(Holm)."""
+(Holm). A mean is judged by its own interval; the noise floor is what one run scatters by."""
 
 from __future__ import annotations
 
@@ -82,9 +82,22 @@ def for_all(rows, verdict) -> str:
     return OPEN if got == REPRODUCES and not is_complete(rows) else got
 
 
+def hundreds(blocks) -> list:
+    """Blocks of the same members of all functions together."""
+    by_number = {}
+    for block in blocks:
+        by_number.setdefault(block["block"], []).append(block)
+    return [table for table in by_number.values() if len(table) == len(ACFS)]
+
+
 def shown(value, form=".2f") -> str:
     """A number in words; a dash for what is not known."""
     return f"{value:{form}}" if np.isfinite(value) else "–"
+
+
+def p_text(p, least) -> str:
+    """A p value of resampling, of which none is smaller than `least`."""
+    return f"≤ {least:.3f}" if p <= least else shown(p, ".3f")
 
 
 def spans(rows, key, low, high, form="+.2f", factor=1.0, unit="") -> str:

@@ -111,14 +111,16 @@ TABLE_5_ROUNDING = 0.005
 
 
 def rows() -> list:
-    """Every printed number as a row: what, low, high, unit, place."""
+    """Every printed number as a row: what, low, high (with the rounding), unit, place."""
     found = [_row(one.what, one.low, one.high, one.unit, one.place) for one in NUMBERS.values()]
     for acf, mean in MEANS.items():
-        found.append(_row(f"mean runout, {acf.upper()}", mean, mean, "dm", MEANS_PLACE))
+        ends = (mean - MEANS_ROUNDING, mean + MEANS_ROUNDING)
+        found.append(_row(f"mean runout, {acf.upper()}", *ends, "dm", MEANS_PLACE))
     for acf, laws in TABLE_5.items():
         for law, pair in laws.items():
             for word, value in zip(("AIC", "BIC"), pair):
-                found.append(_row(f"{word}, {acf.upper()}, {law}", value, value, "", "Table 5"))
+                ends = (value - TABLE_5_ROUNDING, value + TABLE_5_ROUNDING)
+                found.append(_row(f"{word}, {acf.upper()}, {law}", *ends, "", "Table 5"))
     return found
 
 

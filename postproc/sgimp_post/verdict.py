@@ -139,12 +139,8 @@ def warnings(summary: dict) -> list:
             " draws them. Plain means, spreads, histograms and counts of such members mean nothing"
             " and are left out; what is told weighs each member."
         )
-    elif summary["sampling"] not in ("", "random"):
-        found.append(
-            f"The sampling plan is {summary['sampling'].replace('_', ' ')}: members are not"
-            " independent, and the intervals and p values here, which take them to be, do not hold"
-            " for means and exceedance (mostly they are too wide). Control variates are left out."
-        )
+    elif line := dependence_sentence(summary["sampling"]):
+        found.append(line + " Control variates are left out.")
     if summary["sampling"] == "antithetic":
         means = [
             f"{case['label']} {pair['mean']:.3f} m ({pair['mean_low']:.3f} to"
@@ -230,6 +226,17 @@ def _noise_warnings(summary: dict) -> list:
             line += f". Without the nominal homogeneous run it is at most {100.0 * share:.0f} %"
         found.append(line + ".")
     return found
+
+
+def dependence_sentence(sampling: str) -> str:
+    """Of a plan of members that depend on each other; '' for another."""
+    if sampling not in ("antithetic", "latin_hypercube"):
+        return ""
+    return (
+        f"The sampling plan is {sampling.replace('_', ' ')}: members are not independent, and the"
+        " intervals and p values here, which take them to be, do not hold for means and exceedance"
+        " (mostly they are too wide)."
+    )
 
 
 def _named(labels: list, summary: dict) -> str:
