@@ -530,6 +530,17 @@ def test_the_front_is_drawn_from_the_initial_toe():
     assert axis.lines[0].get_ydata() == pytest.approx([0.0, 30.0, 60.0])
 
 
+def test_the_axis_of_the_laws_holds_members_and_printed_laws(tmp_path):
+    cases = [{**case, "values": case["values"] - 2.0} for case in study(30, covs=(0.05,))]
+    ensemble = paper.in_decimetres(read_ensemble(write(tmp_path, [homogeneous(3.9), *cases])))
+    found = paper.paper_cases(ensemble)
+    floor = {"mean": 39.0, "sd": 0.5}
+    axis = paper_figures.density_figure(found, "runout_max", floor, paper.implied()).axes[0]
+    low, high = axis.get_xlim()
+    assert low < min(case.values("runout_max").min() for case in found) < 45.0
+    assert high > paper.gumbel_of(printed.MEANS["bin"], 8.85).ppf(0.99)
+
+
 def broken():
     cases = study(12)
     cases[0]["failed"] = list(range(1, 13))
