@@ -182,6 +182,11 @@ class Ensemble:
         return str(self.attributes.get("state", "unknown"))
 
     @property
+    def provenance(self) -> dict:
+        """What the root says of program, machine, seed and time; without the case files."""
+        return {name: text for name, text in self.attributes.items() if name not in LONG_TEXTS}
+
+    @property
     def is_complete(self) -> bool:
         return self.state == "complete"
 

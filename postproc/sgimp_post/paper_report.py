@@ -74,6 +74,9 @@ def write_comparison(directory: Path, others: list, output: Path, name: str) -> 
                     **numbers,
                     "statements": [asdict(one) for one in found],
                     "consequences": [asdict(one) for one in consequences],
+                    "provenance": {
+                        str(one.directory): one.provenance for one in (ensemble, *beside)
+                    },
                 }
             ),
             indent=1,

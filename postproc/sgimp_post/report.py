@@ -58,6 +58,7 @@ def write_report(directory: Path, output: Path | None = None, primary: str = "ru
             **drawn,
             s=summary,
             a=ensemble.attributes,
+            provenance=ensemble.provenance,
             directory=Path(directory).resolve(),
             verdict=verdict(summary),
             warnings=warnings(summary),
