@@ -13,7 +13,6 @@ from .namelist import read_namelist, resolved_text
 from .random_fields import read_random_fields
 from .samplers import Points
 from .snapshots import find_snapshots, list_steps, read_point_states
-from .two_level import MOST_DENSE
 
 #: Where `sgimp-post casebook DIR` leaves its replays, within DIR.
 CASEBOOK = "casebook"
@@ -65,8 +64,7 @@ class FieldRebuild:
         if fields is None or case.is_homogeneous or not case.has_recorded_fields:
             return {}
         spec = fields.specs[0]
-        is_dense = any(record.method == "cholesky" for record in spec.records.values())
-        if is_dense and spec.points.count > MOST_DENSE:
+        if spec.is_too_dense:
             return {}
         try:
             found = fields.values(case, np.array(ids)).get(spec.name)

@@ -28,6 +28,8 @@ DEFAULT_BOUNDS = {
 }
 #: The program's word for no bound is the largest number.
 _NO_BOUND = 1e300
+#: Points of a dense factor that is made again without being asked for.
+MOST_DENSE = 4000
 #: Numbers of a field that are held at once: 1 GiB.
 MOST_NUMBERS = 2**27
 
@@ -68,6 +70,13 @@ class FieldSpec:
             lower if lower > -_NO_BOUND else -np.inf,
             upper if upper < _NO_BOUND else np.inf,
         )
+
+    @property
+    def is_too_dense(self) -> bool:
+        """To make its factor again takes seconds and hundreds of megabytes, which no picture and no
+        single number is worth."""
+        is_dense = any(record.method == "cholesky" for record in self.records.values())
+        return is_dense and self.points.count > MOST_DENSE
 
     @property
     def distribution(self) -> str:

@@ -150,6 +150,9 @@ def _field_audit(ensemble, gallery: Gallery) -> dict:
         return {"audit_verdict": "Homogeneous ground: there is no random field."}
     if fields.tilt:
         return {"audit_verdict": "Weighted members have shifted fields, which no law describes."}
+    if any(spec.is_too_dense for spec in fields.specs):
+        words = "A dense factor takes long to make again: `sgimp-post fields` audits the fields."
+        return {"audit_verdict": words}
     numbers = audit(fields, AUDITED_MEMBERS)
     entries = [e for e in numbers["fields"] if any(c["lag"] for c in e["correlation"])]
     first = one_of_each_acf(e for e in entries if e["field"] == entries[0]["field"])

@@ -19,7 +19,7 @@ from .errors import PostError
 from .random_fields import read_random_fields
 from .samplers import Points
 from .statistics import CONFIDENCE, benjamini_hochberg, correlation_interval, t_factor
-from .two_level import MOST_DENSE, SAME
+from .two_level import SAME
 
 #: Share of the marked places that may be false ones.
 FALSE_SHARE = 0.05
@@ -165,7 +165,7 @@ def _maps_of(fields, case, name) -> list:
     if not specs:
         raise PostError("its fields were imported")
     for spec in specs:
-        if spec.records[spec.acf_of(case)].method == "cholesky" and spec.points.count > MOST_DENSE:
+        if spec.is_too_dense:
             raise PostError(f"a dense factor of {spec.points.count} points takes too long")
     _check_rebuilt(fields, known)
     halves = known.id % 2 == 0

@@ -20,8 +20,6 @@ from .control_variates import (
 from .errors import PostError
 from .random_fields import read_random_fields
 
-#: A dense factor of more points takes seconds and hundreds of megabytes: not for one number.
-MOST_DENSE = 4000
 #: A field mean that is rebuilt differs from the one on record by rounding, in either precision.
 SAME = 1e-6
 #: Keys of a study that leave the points and the law at each of them alone: how values go together
@@ -118,16 +116,15 @@ def expected_field_means(ensemble) -> dict:
         fields = read_random_fields(ensemble.directory)
     except PostError:
         return {}
-    if fields is None or not fields.specs or fields.specs[0].file:
+    if fields is None or not fields.specs:
         return {}
     spec, found = fields.specs[0], {}
+    if spec.file or spec.is_too_dense:
+        return {}
     for case in ensemble.cases:
         if case.role != "study" or not case.ok.any():
             continue
         try:
-            acf = spec.acf_of(case)
-            if spec.records[acf].method == "cholesky" and spec.points.count > MOST_DENSE:
-                continue
             if not case.has_recorded_fields:
                 if not fields.has_data and _is_harmless(case):
                     found[case.label] = _mean_of_law(fields, spec, case)

@@ -152,8 +152,8 @@ def warnings(summary: dict) -> list:
             found.append("Means with the interval of their mirrored pairs: " + "; ".join(means))
     if totals["unsettled"]:
         found.append(
-            f"{totals['unsettled']} members were still moving at end_time;"
-            " their runout is a lower bound."
+            f"{totals['unsettled']} members were not at rest at end_time (`settle` is a share of"
+            " their own largest kinetic energy); what still ran then makes a runout a lower bound."
         )
     if totals["wall_touched"]:
         found.append(
