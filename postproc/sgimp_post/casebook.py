@@ -163,9 +163,9 @@ def _draw(case, exhibits, frames: int, out: Path) -> None:
         files = animate(view, states, times, f"{case.label}, {one.name}", runout, out / path.stem)
         two = read_point_states(path, [one.track.half_way, int(one.track.steps[-1])])
         figure = still_figure(view, list(two), one.name, runout)
-        for kind in ("png", *FIGURE_KINDS):
+        for kind, dpi in {"png": 130, **FIGURE_KINDS}.items():
             files.append(out / f"{path.stem}.{kind}")
-            files[-1].write_bytes(rendered(figure, kind))
+            files[-1].write_bytes(rendered(figure, kind, dpi))
         plt.close(figure)
         one.gif, one.still = f"{path.stem}.gif", f"{path.stem}.png"
         one.files = [file.name for file in files]

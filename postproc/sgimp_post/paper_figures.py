@@ -191,7 +191,7 @@ def density_figure(cases, name: str, homogeneous: dict, implied: list):
         axes[1].errorbar(
             k - 0.14,
             got.mean,
-            got.sd,
+            np.nan_to_num(got.sd),  # of one member there is none
             color=acf_colour(case.acf),
             lw=1.6,
             capsize=3,

@@ -57,8 +57,9 @@ STYLE = {
     "svg.hashsalt": "sgimp",
     "pdf.fonttype": 42,
 }
-#: Forms in which every figure of a report is also written, for papers.
-FIGURE_KINDS = ("svg", "pdf")
+#: Forms in which every figure of a report is also written, for papers, with the resolution of what
+#: is rasterized in them; the pages embed the first.
+FIGURE_KINDS = {"svg": 100, "pdf": 200}
 _FONT = b"'DejaVu Sans'"
 _COMMENT = re.compile(rb" *<!--.*?-->\n", re.DOTALL)
 _PATH = re.compile(rb' d="([^"]*)"')
@@ -103,7 +104,7 @@ def colour(case) -> str:
     return acf_colour(case.acf)
 
 
-def rendered(figure, kind: str = "svg", dpi: int = 130) -> bytes:
+def rendered(figure, kind: str = "svg", dpi: int = 100) -> bytes:
     """The figure as a file of this kind; the same figure gives the same bytes."""
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     buffer = io.BytesIO()
@@ -131,7 +132,9 @@ class Gallery:
         """The data URI of the figure, which is closed; None of None."""
         if figure is None:
             return None
-        self.files.update({f"{name}.{kind}": rendered(figure, kind) for kind in FIGURE_KINDS})
+        self.files.update(
+            {f"{name}.{kind}": rendered(figure, kind, dpi) for kind, dpi in FIGURE_KINDS.items()}
+        )
         plt.close(figure)
         return svg_uri(self.files[f"{name}.svg"])
 

@@ -219,10 +219,10 @@ def test_netcdf_has_dimensions_units_and_names(ensemble):
         members, x = [1, 2, 3, 5], np.union1d(0.25 + 0.5 * np.arange(40), CELLS)
         assert list(file["case"].asstr()) == ["deterministic", "base"]
         assert list(file["member"]) == members and list(file["x"]) == list(x)
-        assert all(file[name].is_scale for name in ("case", "member", "x"))
+        assert all(h5py.h5ds.is_scale(file[name].id) for name in ("case", "member", "x"))
         for name, dataset in file.items():
             assert dataset.attrs["long_name"]
-            if not dataset.is_scale:
+            if not h5py.h5ds.is_scale(dataset.id):
                 axes = [dimension[0].name for dimension in dataset.dims]
                 assert axes == ["/case", "/member", "/x"][: dataset.ndim], name
         runout, status = file["runout_max"][...], file["status"][...]
