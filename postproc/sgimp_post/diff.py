@@ -11,11 +11,9 @@ from .merge import PROGRAM
 from .namelist import by_key, differing_keys, identity_by_key, read_namelist, resolved_text
 from .noise_floor import noise_floor
 from .pairs import paired_values
-from .statistics import holm
+from .statistics import LEVEL, holm
 from .two_samples import TwoSamples, compare
 
-#: A difference is a finding below this p value, adjusted for the number of comparisons.
-LEVEL = 0.05
 #: Fewest exchanges within pairs.
 _SHUFFLES = 1999
 _LONGEST_VALUE = 60

@@ -17,6 +17,7 @@ from . import field_figures
 from .errors import PostError
 from .field_audit import audit, audit_rows, one_of_each_acf
 from .random_fields import read_random_fields
+from .samplers import SAME_POINT
 from .snapshots import find_snapshots
 from .style import Gallery
 from .tables import null_for_nan
@@ -24,8 +25,6 @@ from .tables import null_for_nan
 #: Members of an audit if none are named: enough to see an error of the standard deviation of 1 %
 #: in the baseline case, in seconds.
 MEMBERS = 200
-#: Points closer than this share of the extent of a field are the same.
-_SAME_PLACE = 1e-7
 
 
 def run(options) -> int:
@@ -283,7 +282,7 @@ def _against_snapshots(fields, directory):
                 continue
             distance, point = tree.query(np.column_stack([spec.points.x, spec.points.y]))
             extent = max(np.ptp(spec.points.x), np.ptp(spec.points.y), 1e-300)
-            if distance.max() > _SAME_PLACE * extent:
+            if distance.max() > SAME_POINT * extent:
                 raise PostError(f"{path}: the points are not those of field {spec.name}")
             free = ~np.isin(point, taken.get(key, []))
             taken[key] = np.r_[taken.get(key, []), point]

@@ -215,59 +215,38 @@ def weighted_figure(cases, name: str, deterministic: dict):
 
 
 @styled
-def configuration_figure(snapshot, geometry):
-    """Initial field and final deposit, coloured by friction angle: red strong, blue weak
-    (Figs. 8 and 9 of the paper)."""
-    states = [state for state in (snapshot.initial, snapshot.final) if state is not None]
-    if not states:
-        return None
-    left, bottom = np.min([state.position.min(axis=0) for state in states], axis=0)
-    top = max(state.position[:, 1].max() for state in states)
+def configuration_figure(state, geometry):
+    """The points of a state (State), coloured by friction angle: red strong, blue weak (Figs. 7 and
+    9 of the paper)."""
+    left, bottom = state.position.min(axis=0)
+    right, top = state.position.max(axis=0)
     spacing = geometry.point_spacing or (top - bottom) / 80 or 1.0
-    widths = [state.position[:, 0].max() - left + spacing for state in states]
-    height = top - bottom + spacing
-    figure, axes = plt.subplots(
-        1,
-        len(states),
-        figsize=(11.5, 1.15 + 9.6 * height / sum(widths)),
-        squeeze=False,
-        gridspec_kw={"width_ratios": widths},
-    )
-    angles = np.concatenate([state.friction_angle for state in states])
-    angles = angles[np.isfinite(angles)]
-    middle = float(np.mean(angles)) if len(angles) else 0.0
+    width, height = right - left + spacing, top - bottom + spacing
+    figure, axis = plt.subplots(figsize=(11.5, 1.15 + 9.6 * height / width))
+    angles = state.friction_angle[np.isfinite(state.friction_angle)]
     # Homogeneous ground (to within the jitter of its strength) has one colour and no bar.
     is_uniform = len(angles) == 0 or float(np.ptp(angles)) < 1e-2
-    spread = 3.0 * float(np.std(angles)) if not is_uniform else 1.0
-    for axis, state, width in zip(axes[0], states, widths):
-        points = 11.5 * 72 * 0.84 / sum(widths) * spacing
-        tint = (
-            {"color": OTHER}
-            if is_uniform
-            else {
-                "c": state.friction_angle,
-                "cmap": matplotlib.colormaps["RdYlBu_r"].with_extremes(bad="#B4BEC6"),
-                "plotnonfinite": True,
-                "vmin": middle - spread,
-                "vmax": middle + spread,
-            }
-        )
-        drawn = axis.scatter(
-            *state.position.T,
-            s=max(points**2 * 0.9, 0.3),
-            marker="s",
-            lw=0,
-            rasterized=True,
-            **tint,
-        )
-        axis.set_aspect("equal")
-        axis.set_xlim(left - 0.02 * width, left + 1.02 * width)
-        axis.set_ylim(bottom - 0.01 * height, bottom + 1.02 * height)
-        axis.grid(False)
-        axis.set_xlabel("x [m]")
-        axis.set_title(f"t = {state.time:.2f} s")
-    axes[0, 0].set_ylabel("y [m]")
-    if is_uniform:
-        return figure
-    figure.colorbar(drawn, ax=list(axes[0]), label="friction angle [°]", shrink=0.9, pad=0.01)
+    tint = {"color": OTHER}
+    if not is_uniform:
+        middle, spread = float(np.mean(angles)), 3.0 * float(np.std(angles))
+        tint = {
+            "c": state.friction_angle,
+            "cmap": matplotlib.colormaps["RdYlBu_r"].with_extremes(bad="#B4BEC6"),
+            "plotnonfinite": True,
+            "vmin": middle - spread,
+            "vmax": middle + spread,
+        }
+    size = 11.5 * 72 * 0.84 / width * spacing
+    drawn = axis.scatter(
+        *state.position.T, s=max(size**2 * 0.9, 0.3), marker="s", lw=0, rasterized=True, **tint
+    )
+    axis.set_aspect("equal")
+    axis.set_xlim(left - 0.02 * width, left + 1.02 * width)
+    axis.set_ylim(bottom - 0.01 * height, bottom + 1.02 * height)
+    axis.grid(False)
+    axis.set_xlabel("x [m]")
+    axis.set_ylabel("y [m]")
+    axis.set_title(f"t = {state.time:.2f} s")
+    if not is_uniform:
+        figure.colorbar(drawn, ax=axis, label="friction angle [°]", shrink=0.9, pad=0.01)
     return figure

@@ -20,11 +20,9 @@ from .fits import (
     place_on_line,
     standardised,
 )
-from .statistics import CONFIDENCE, blocks, finite
+from .statistics import CONFIDENCE, LEVEL, blocks, finite
 
 PROBABILITIES = (0.95, 0.99, 0.999)
-#: A law is refuted below this p value.
-LEVEL = 0.05
 #: Fewest values for a bootstrap.
 FEWEST_FOR_BOOTSTRAP = 8
 _TAILS = (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE)

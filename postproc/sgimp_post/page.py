@@ -10,17 +10,17 @@ from .style import UNIT_TEXTS
 
 
 def environment() -> jinja2.Environment:
-    environment = jinja2.Environment(
+    templates = jinja2.Environment(
         loader=jinja2.PackageLoader("sgimp_post"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = _number
-    environment.filters["share"] = lambda value: _number(100.0 * max(value, 0.0), 0)
-    environment.filters["scientific"] = _scientific
-    environment.filters["percent"] = lambda value: _number(100.0 * value, 1)
-    return environment
+    templates.filters["number"] = _number
+    templates.filters["share"] = lambda value: _number(100.0 * max(value, 0.0), 0)
+    templates.filters["scientific"] = _scientific
+    templates.filters["percent"] = lambda value: _number(100.0 * value, 1)
+    return templates
 
 
 def _number(value, digits: int = 3) -> str:

@@ -6,10 +6,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from .diff import LEVEL
 from .ensemble import RUNOUTS
 from .fits import LAWS
-from .paper import BLOCK, together, wall_runout, wave_speed
+from .paper import BLOCK, WALL, together, wall_runout, wave_speed
 from .paper_verdicts import (
     DOES_NOT,
     NONE_YET,
@@ -26,7 +25,7 @@ from .paper_verdicts import (
     spans,
 )
 from .printed import ACFS, BASELINE, COVS, MEANS, MEANS_PLACE, NUMBERS, TABLE_5
-from .statistics import wilson
+from .statistics import LEVEL, wilson
 
 
 def statements(n: dict) -> list:
@@ -213,7 +212,7 @@ def _wall(n) -> Statement:
     found = [
         (s, row)
         for s in n["sensitivities"]
-        if s["settings"]["x_max"] is not None and np.isclose(s["settings"]["x_max"], 14.0)
+        if s["settings"]["x_max"] is not None and np.isclose(s["settings"]["x_max"], WALL)
         for row in s["rows"]
         if row["runout"] == n["runout"] and row["role"] == "study" and row["n"] > 1
     ]

@@ -3,8 +3,6 @@ dotted lines and bands. Runouts in dm."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -12,7 +10,7 @@ from .autocorrelation import Correlation, rho
 from .ensemble import RUNOUTS
 from .figures import configuration_figure, draw_histogram, mark_deterministic
 from .fits import LAWS, distribution_of, fit_laws
-from .paper import BLOCK, NO_SHARE, gumbel_of, is_baseline
+from .paper import BLOCK, DECIMETRES, NO_SHARE, gumbel_of, is_baseline
 from .printed import ACFS, BASELINE, COVS, MEANS, NUMBERS, TABLE_5
 from .statistics import describe, running
 from .study_figures import draw_against_cov
@@ -71,7 +69,9 @@ def front_figure(history: dict, origin: str, homogeneous: dict, toe: float):
     lines = (("front_max", "runout_max", OTHER), ("front_q995", "runout_q995", "#D55E00"))
     for name, key, tint in lines:
         if name in history:
-            axis.plot(time, 10.0 * (history[name] - toe), color=tint, lw=1.6, label=RUNOUTS[key])
+            axis.plot(
+                time, DECIMETRES * (history[name] - toe), color=tint, lw=1.6, label=RUNOUTS[key]
+            )
     mark_deterministic(axis, homogeneous, vertical=False)
     axis.axhline(NUMBERS["homogeneous"].value, label="printed: 60.03 dm, 1.4 s, 4.2 s", **_DOTTED)
     for key in ("fast_from", "rest"):
@@ -88,14 +88,14 @@ def front_figure(history: dict, origin: str, homogeneous: dict, toe: float):
 def deposit_figure(snapshot, geometry, low: float, high: float):
     """Figs. 7 and 9: final deposit of a member, a printed range of fronts (dm from the left wall)
     marked on it; None where there is no final state."""
-    figure = configuration_figure(replace(snapshot, initial=None), geometry)
-    if figure is None:
+    if snapshot.final is None:
         return None
+    figure = configuration_figure(snapshot.final, geometry)
     axis = figure.axes[0]
     left, right = axis.get_xlim()
-    axis.set_xlim(left, max(right, 0.1 * high + 0.2))
+    axis.set_xlim(left, max(right, high / DECIMETRES + 0.2))
     for place in dict.fromkeys((low, high)):
-        axis.axvline(0.1 * place, **_DOTTED)
+        axis.axvline(place / DECIMETRES, **_DOTTED)
     return figure
 
 

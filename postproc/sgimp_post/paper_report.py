@@ -21,10 +21,10 @@ from .ensemble import RUNOUTS, read_ensemble
 from .errors import PostError
 from .fits import LAWS
 from .page import environment
-from .paper import BLOCK, compare_with_paper, in_decimetres, paper_cases
+from .paper import BLOCK, DECIMETRES, compare_with_paper, in_decimetres, paper_cases
 from .paper_verdicts import p_text
 from .printed import ACFS, BASELINE, NUMBERS
-from .random_fields import read_random_fields
+from .random_fields import random_fields_of
 from .snapshots import find_snapshots, read_snapshot
 from .style import Gallery
 from .tables import null_for_nan, write_table
@@ -215,7 +215,7 @@ def _front(ensemble, beside: list, numbers: dict):
 def _maps(ensemble):
     """The random fields of the first members of the baseline, rebuilt from the seed."""
     try:
-        fields = read_random_fields(ensemble.directory)
+        fields = random_fields_of(ensemble)
         if fields is None:
             return None
         spec, rows = fields.specs[0], []
@@ -234,7 +234,7 @@ def _maps(ensemble):
 def _column(ensemble, gallery: Gallery):
     for case, snapshot in _snapshots(ensemble):
         if case.is_homogeneous:
-            toe = 10.0 * (case.geometry.toe or 0.0)
+            toe = DECIMETRES * (case.geometry.toe or 0.0)
             place = toe + NUMBERS["homogeneous"].value
             return gallery.add(
                 "fig_07_column",

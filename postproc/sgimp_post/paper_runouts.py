@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .diff import LEVEL
 from .ensemble import RUNOUTS
 from .paper import BLOCK, NO_SHARE
 from .paper_verdicts import (
@@ -29,6 +28,7 @@ from .paper_verdicts import (
     spans,
 )
 from .printed import ACFS, BASELINE, COVS, MEANS, MEANS_PLACE, MEANS_ROUNDING, NUMBERS
+from .statistics import LEVEL
 
 #: Fewest tables of a hundred members each that say how far the ends of a range scatter.
 _FEWEST_TABLES = 5

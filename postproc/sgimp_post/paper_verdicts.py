@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .diff import LEVEL
 from .printed import ACFS, NUMBERS
+from .statistics import LEVEL
 
 #: A shift of a mean without effect.
 NO_SHIFT = (0.0, 0.0)

@@ -30,6 +30,8 @@ DEFAULT_BOUNDS = {
 _NO_BOUND = 1e300
 #: Points of a dense factor that is made again without being asked for.
 MOST_DENSE = 4000
+#: A field mean that is rebuilt differs from the one on record by rounding, in either precision.
+SAME_MEAN = 1e-6
 #: Numbers of a field that are held at once: 1 GiB.
 MOST_NUMBERS = 2**27
 
@@ -234,6 +236,14 @@ class RandomFields:
     def _normal(self, stream, realization, count):
         return normal(self.plan, self.seed, stream, int(realization), count, self.realizations)
 
+    def is_on_record(self, case, row: int) -> bool:
+        """The mean of the first field of this row, rebuilt, is the one that the program recorded,
+        but for rounding in either precision. A study may have moved the points or the law, which
+        the record of the fields does not tell."""
+        recorded = case.column("field_mean")[row]
+        rebuilt = self.values(case, case.id[row : row + 1])[self.specs[0].name].mean()
+        return bool(abs(rebuilt - recorded) <= SAME_MEAN * abs(recorded))
+
     def gaussian(self, case, ids) -> dict:
         """Standard Gaussian fields {name: [N, n]} before they know any data."""
         fields = {
@@ -365,8 +375,12 @@ class _GaussianData:
 
 def read_random_fields(directory: Path) -> RandomFields | None:
     """The fields of the run in DIR; None if it is deterministic."""
-    directory = Path(directory)
-    ensemble = read_ensemble(directory)
+    return random_fields_of(read_ensemble(directory))
+
+
+def random_fields_of(ensemble) -> RandomFields | None:
+    """The same of a run whose results have been read."""
+    directory = ensemble.directory
     groups = read_namelist(*resolved_text(ensemble))
     keys = [keys for name, keys in groups if name == "random_field"]
     if not keys:

@@ -15,7 +15,7 @@ from .heat_table import heat_tables
 from .member_section import member_entries
 from .noise_floor import noise_floor
 from .page import environment, field_unit
-from .random_fields import read_random_fields
+from .random_fields import random_fields_of
 from .reach_figures import overview_figure, reach_figure
 from .report_tables import report_tables
 from .soil_map_figures import shared_limit, soil_map_figure
@@ -143,7 +143,7 @@ def _study_figures(cases, summary: dict, deterministic: dict, gallery: Gallery) 
 def _field_audit(ensemble, gallery: Gallery) -> dict:
     """Of the first members of each case, or why there is none."""
     try:
-        fields = read_random_fields(ensemble.directory)
+        fields = random_fields_of(ensemble)
     except PostError as cause:
         return {"audit_verdict": f"The fields cannot be rebuilt: {cause}."}
     if fields is None or not fields.cases:

@@ -16,6 +16,8 @@ _SAME_COORDINATE = 1e-9
 _MOST_SITES_PER_POINT = 16
 #: Share of a scale of fluctuation within which a measurement is at a point.
 SAME_PLACE = 1e-9
+#: Share of the extent of a field within which two points are the same.
+SAME_POINT = 1e-7
 #: Eigenvalues of a recorded ring below minus this share of the largest are no rounding.
 _ROUNDING = 1e-10
 

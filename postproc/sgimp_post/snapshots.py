@@ -29,8 +29,7 @@ class State:
 class Snapshot:
     label: str
     id: int
-    #: None if step 0 is not in the file.
-    initial: State | None
+    #: None if no later state than the first one is in the file.
     final: State | None
     #: Columns of /history by name; empty if there is none.
     history: dict = field(default_factory=dict)
@@ -65,13 +64,12 @@ def read_snapshot(label: str, member: int, path: Path) -> Snapshot | None:
             steps = _steps(file)
             if not steps:
                 return None
-            first, last = steps[0], steps[-1]
-            initial = _read_state(file, *first) if first[0] == 0 else None
+            last = steps[-1]
             final = _read_state(file, *last) if last[0] > 0 else None
             history = {}
             if "history" in file:
                 history = {name: dataset[...] for name, dataset in file["history"].items()}
-            return Snapshot(label, member, initial, final, history)
+            return Snapshot(label, member, final, history)
     except (OSError, KeyError, ValueError, RuntimeError):
         return None
 

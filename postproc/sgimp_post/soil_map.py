@@ -16,10 +16,9 @@ from scipy.spatial import cKDTree
 
 from .ensemble import RUNOUTS, most_variable
 from .errors import PostError
-from .random_fields import read_random_fields
-from .samplers import Points
+from .random_fields import random_fields_of
+from .samplers import SAME_POINT, Points
 from .statistics import CONFIDENCE, benjamini_hochberg, correlation_interval, t_factor
-from .two_level import SAME
 
 #: Share of the marked places that may be false ones.
 FALSE_SHARE = 0.05
@@ -38,8 +37,6 @@ EXCHANGES = 199
 _MOST_PROBES = 10_000
 #: Values of a field that are held at once: 32 MiB.
 _MOST_VALUES = 2**22
-#: Points closer than this share of the extent of a field are the same, as in the audit.
-_SAME_PLACE = 1e-7
 #: A variance below this (of 1) is rounding: the field is known there, from a measurement.
 _NO_VARIANCE = 1e-9
 
@@ -138,7 +135,7 @@ def soil_maps(ensemble, name: str):
         words = sampling.replace("_", " ")
         return [], [f"No map of which soil decides: members of sampling {words} are not alike."]
     try:
-        fields = read_random_fields(ensemble.directory)
+        fields = random_fields_of(ensemble)
         if fields is None:
             return [], ["The run has no random field: there is no map of which soil decides."]
     except PostError as cause:
@@ -167,7 +164,9 @@ def _maps_of(fields, case, name) -> list:
     for spec in specs:
         if spec.is_too_dense:
             raise PostError(f"a dense factor of {spec.points.count} points takes too long")
-    _check_rebuilt(fields, known)
+    is_recorded = not fields.specs[0].file and np.isfinite(known.column("field_mean")[0])
+    if is_recorded and not fields.is_on_record(known, 0):
+        raise PostError("the field that is rebuilt is not the one on record")
     halves = known.id % 2 == 0
     if min(np.count_nonzero(halves), np.count_nonzero(~halves)) < FEWEST // 2 or any(
         np.ptp(runout[half]) == 0.0 for half in (halves, ~halves)
@@ -200,7 +199,7 @@ def _where_it_counts(fields, spec) -> np.ndarray:
     """Mask of its points: where several fields of a property cover a point, the last one counts."""
     free = np.ones(spec.points.count, dtype=bool)
     places = np.column_stack([spec.points.x, spec.points.y])
-    near = _SAME_PLACE * max(np.ptp(places), 1e-300)
+    near = SAME_POINT * max(np.ptp(places), 1e-300)
     for later in fields.specs[spec.index :]:
         if later.property.replace("tan_", "") == spec.property.replace("tan_", ""):
             tree = cKDTree(np.column_stack([later.points.x, later.points.y]))
@@ -210,16 +209,6 @@ def _where_it_counts(fields, spec) -> np.ndarray:
 
 def _part(points, kept) -> Points:
     return Points(*(column[kept] for column in (points.x, points.y, points.width, points.height)))
-
-
-def _check_rebuilt(fields, case) -> None:
-    """A study may have moved the points or the law, which the record does not tell."""
-    spec, recorded = fields.specs[0], case.column("field_mean")[0]
-    if spec.file or not np.isfinite(recorded):
-        return
-    rebuilt = fields.values(case, case.id[:1])[spec.name].mean()
-    if not abs(rebuilt - recorded) <= SAME * abs(recorded):
-        raise PostError("the field that is rebuilt is not the one on record")
 
 
 def _finished(case, spec, body, runout, halves, sums, blocks, means) -> SoilMap:

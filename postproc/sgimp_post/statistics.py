@@ -8,6 +8,8 @@ import numpy as np
 from scipy import stats
 
 CONFIDENCE = 0.95
+#: Below this p value, adjusted for the number of comparisons, a finding is none of chance.
+LEVEL = 0.05
 #: Fewest values for an interval of the standard deviation.
 FEWEST_FOR_SD = 8
 #: Numbers held at once.

@@ -82,7 +82,8 @@ def draw_against_cov(axis, cases, estimate):
         rows = sorted((case for case in cases if case["acf"] == acf), key=lambda case: case["cov"])
         x = np.array([row["cov"] for row in rows]) + 0.0012 * (k - 0.5 * (len(acfs) - 1))
         y, low, high = np.array([estimate(row) for row in rows], dtype=float).T
-        x, y, low, high = (values[np.isfinite(y)] for values in (x, y, low, high))
+        known = np.isfinite(y)
+        x, y, low, high = x[known], y[known], low[known], high[known]
         tint, span = acf_colour(acf), np.nan_to_num(np.abs([y - low, high - y]))
         axis.errorbar(
             x, y, span, color=tint, marker="o", ms=4, capsize=2, lw=1.3, label=acf.upper()

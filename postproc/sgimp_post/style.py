@@ -128,7 +128,7 @@ class Gallery:
         #: Contents by file name.
         self.files = {}
 
-    def add(self, name: str, figure) -> str:
+    def add(self, name: str, figure) -> str | None:
         """The data URI of the figure, which is closed; None of None."""
         if figure is None:
             return None

@@ -18,10 +18,8 @@ from .control_variates import (
     realised_gain,
 )
 from .errors import PostError
-from .random_fields import read_random_fields
+from .random_fields import random_fields_of
 
-#: A field mean that is rebuilt differs from the one on record by rounding, in either precision.
-SAME = 1e-6
 #: Keys of a study that leave the points and the law at each of them alone: how values go together
 #: in the field, how the ground is loaded, and how it is computed.
 HARMLESS_KEYS = {
@@ -113,7 +111,7 @@ def expected_field_means(ensemble) -> dict:
     of a member, rebuilt, is the one on record, as a study may have moved the points or the law; or
     where there are no measurements and the study has moved neither."""
     try:
-        fields = read_random_fields(ensemble.directory)
+        fields = random_fields_of(ensemble)
     except PostError:
         return {}
     if fields is None or not fields.specs:
@@ -130,11 +128,8 @@ def expected_field_means(ensemble) -> dict:
                     found[case.label] = _mean_of_law(fields, spec, case)
                 continue
             first = int(np.flatnonzero(case.ok)[0])
-            rebuilt = fields.values(case, case.id[first : first + 1])[spec.name].mean()
-            recorded = case.column("field_mean")[first]
-            if not abs(rebuilt - recorded) <= SAME * abs(recorded):
-                continue
-            found[case.label] = _mean_of_law(fields, spec, case)
+            if fields.is_on_record(case, first):
+                found[case.label] = _mean_of_law(fields, spec, case)
         except PostError:
             continue
     return found

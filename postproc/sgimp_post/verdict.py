@@ -6,7 +6,8 @@ import math
 
 from .ensemble import RUNOUTS
 from .fits import LAWS, rivals
-from .law_choice import FEWEST_FOR_BOOTSTRAP, LEVEL, LawChoice
+from .law_choice import FEWEST_FOR_BOOTSTRAP, LawChoice
+from .statistics import LEVEL
 
 
 def verdict(summary: dict) -> list:

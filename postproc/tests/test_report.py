@@ -15,7 +15,7 @@ from synthetic import RUNOUTS_FACTOR, sample, write_ensemble
 from sgimp_post.cli import main
 from sgimp_post.ensemble import Geometry, read_ensemble
 from sgimp_post.figures import configuration_figure, weighted_figure
-from sgimp_post.snapshots import Snapshot, State, read_snapshot
+from sgimp_post.snapshots import State, read_snapshot
 
 HOMOGENEOUS = {"label": "deterministic", "values": sample(1, 8, 5.6, 0.05)}
 
@@ -201,7 +201,7 @@ def test_a_deposit_is_drawn_where_it_lies(shift):
     x, y = np.meshgrid(np.linspace(0, 10, 30), np.linspace(0, 5, 20))
     points = np.column_stack([x.ravel() + shift, y.ravel()])
     state = State(7, 1.0, points, np.full(len(points), 35.0))
-    figure = configuration_figure(Snapshot("base", 1, None, state), Geometry(point_spacing=0.25))
+    figure = configuration_figure(state, Geometry(point_spacing=0.25))
     low, high = figure.axes[0].get_xlim()
     assert low <= shift < shift + 10 <= high and high - low < 12
 
