@@ -1,15 +1,18 @@
 !> Cost per point and step on the paper's column: whole runs of the three schemes, and where the
 !> time of usl goes.
-!> Usage: bench_kernel CASE.nml [end_time [scheme]]; with a scheme, the run of that one and no more.
+!> Usage: bench_kernel CASE.nml [end_time [scheme [repeats]]]; with a scheme, the run of that one and
+!> no more.
 !> Prints processor time, which a busy machine spoils less than wall time, and beside it the wall
-!> time, which alone tells what threads are worth; judges nothing.
+!> time, which alone tells what threads are worth; judges nothing. With repeats the same run is made
+!> so many times, and the first number adds up the least time of each few milliseconds of it (the
+!> steps between two questions to the monitor): what a run costs that nobody disturbs, as long as
+!> every part of it was once left in peace.
 program bench_kernel
   use case_file, only: read_case, stop_on_error
   use sg_config, only: config_t
   use sg_errors, only: error_t
   use sg_kinds, only: i8, wp
   use sg_grid, only: losses_t
-  use sg_monitor, only: patient_monitor_t
   use sg_observer, only: blind_observer_t
   use sg_outcome, only: outcome_t, reset_outcome, STEPS
   use sg_scene, only: build_scene, scene_t
@@ -20,6 +23,7 @@ program bench_kernel
   use sg_transfer, only: gather_motion_and_gradient, map_momentum_and_force
   use sg_variation, only: variation_t
   use sg_weighting, only: BLOCK, weights_t
+  use stopwatch, only: stopwatch_t
   implicit none
 
   character(len=4), parameter :: SCHEMES(3) = ['usl ', 'musl', 'usf ']
@@ -27,7 +31,7 @@ program bench_kernel
   type(scene_t) :: scene
   type(error_t), allocatable :: error
   character(len=512) :: argument
-  integer :: k
+  integer :: k, repeats
 
   call get_command_argument(1, argument)
   call read_case(trim(argument), config)
@@ -37,37 +41,44 @@ program bench_kernel
   call stop_on_error(error)
   print '(a, i0, a, f6.3, a)', 'points ', scene%particles%count, ', cells of ', &
     config%grid%cell_size, ' m'
+  call get_command_argument(4, argument)
+  repeats = 1
+  if (argument /= '') read (argument, *) repeats
   call get_command_argument(3, argument)
   if (argument /= '') then
-    call time_run(trim(argument))
+    call time_run(trim(argument), repeats)
   else
     do k = 1, size(SCHEMES)
-      call time_run(trim(SCHEMES(k)))
+      call time_run(trim(SCHEMES(k)), repeats)
     end do
     call time_phases()
   end if
 
 contains
 
-  !> A whole run; the flowing phase costs more than the first steps.
-  subroutine time_run(scheme)
+  !> Whole runs; the flowing phase costs more than the first steps.
+  subroutine time_run(scheme, repeats)
     character(len=*), intent(in) :: scheme
+    integer, intent(in) :: repeats
     type(variation_t) :: variation
-    type(patient_monitor_t) :: monitor
+    type(stopwatch_t) :: watch
     type(blind_observer_t) :: observer
     type(outcome_t) :: outcome
-    real(wp) :: started, ended, wall_started
+    real(wp) :: wall_started
+    integer :: repeat
 
     config%solver%scheme = scheme
-    call reset_outcome(outcome, 1, 1_i8, size(scene%profile_x))
     wall_started = wall_seconds()
-    call cpu_time(started)
-    call simulate(config, scene, variation, monitor, observer, outcome)
-    call cpu_time(ended)
+    do repeat = 1, repeats
+      call reset_outcome(outcome, 1, 1_i8, size(scene%profile_x))
+      call watch%start()
+      call simulate(config, scene, variation, watch, observer, outcome)
+      call watch%stop()
+    end do
     print '(a5, f8.1, a, i7, a, f7.2, a, f8.3, a)', scheme, &
-      1.0e9_wp*(ended - started)/(outcome%values(STEPS)*scene%particles%count), &
-      ' ns per point and step, grid included;', nint(outcome%values(STEPS)), ' steps,', ended &
-      - started, ' s, by the clock', wall_seconds() - wall_started, ' s'
+      1.0e9_wp*watch%least_seconds()/(outcome%values(STEPS)*scene%particles%count), &
+      ' ns per point and step, grid included;', nint(outcome%values(STEPS)), ' steps,', &
+      watch%least_seconds(), ' s, by the clock', (wall_seconds() - wall_started)/repeats, ' s'
   end subroutine time_run
 
   !> Each part by itself, on the state after a second of flow. Parts run apart lose what the block
