@@ -545,7 +545,7 @@ contains
     associate (p => this%particles, g => this%grid)
       call this%axis_weights(n, p%x(first:last), p%width(first:last), g%x, w%i, w%sx, w%gx)
       call this%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, w%gy)
-      call w%number_nodes(n, g%x%last)
+      call w%find_stencils(n, g%x%last)
     end associate
   end subroutine find_weights
 

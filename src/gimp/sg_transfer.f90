@@ -21,7 +21,7 @@
 !> laid out for the whole block first: vectors put together from numbers just computed would stall
 !> the loads behind them.
 module sg_transfer
-  use sg_kinds, only: dp, wp
+  use sg_kinds, only: dp, i8, wp
   use sg_vectors, only: VECTOR_BYTES
   use sg_weighting, only: axis_t, BLOCK, weights_t
   implicit none
@@ -47,19 +47,36 @@ contains
     !> Last node of `total`.
     integer, intent(in) :: last
     real(wp), intent(inout) :: total(8, 0:last)
-    real(wp) :: brought(4, BLOCK), along_row(4), s
+
+    call add_momentum(2, 2, n, w, mass, vx, vy, last, total)
+    call add_momentum(3, 2, n, w, mass, vx, vy, last, total)
+    call add_momentum(2, 3, n, w, mass, vx, vy, last, total)
+    call add_momentum(3, 3, n, w, mass, vx, vy, last, total)
+  end subroutine map_momentum
+
+  !> map_momentum for the points that reach so many `columns` and `rows`.
+  pure subroutine add_momentum(columns, rows, n, w, mass, vx, vy, last, total)
+    integer, intent(in) :: columns, rows, n, last
+    type(weights_t), intent(in) :: w
+    real(wp), intent(in) :: mass, vx(n), vy(n)
+    real(wp), intent(inout) :: total(8, 0:last)
+    real(wp) :: brought(4), along_row(4), s
+    integer(i8) :: points
     integer :: p, i, j, k, node
 
-    call pack_momentum(n, mass, vx, vy, brought)
-    do p = 1, n
-      do j = 1, 3
+    points = w%reaching(columns, rows)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
+      brought = [mass, mass*vx(p), mass*vy(p), mass]
+      do j = 1, rows
         node = w%row(p, j) - 1
         s = w%sy(p, j)
         !$omp simd simdlen(4)
         do k = 1, 4
-          along_row(k) = s*brought(k, p)
+          along_row(k) = s*brought(k)
         end do
-        do i = 1, 3
+        do i = 1, columns
           s = w%sx(p, i)
           !$omp simd simdlen(4)
           do k = 1, 4
@@ -68,7 +85,7 @@ contains
         end do
       end do
     end do
-  end subroutine map_momentum
+  end subroutine add_momentum
 
   !> Adds to the momentum of the nodes what the velocities about `n` points differ from those at
   !> them, L (x_i - x_p); no momentum in sum, since the weights reproduce linear functions. Adds
@@ -135,34 +152,50 @@ contains
     real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: last
     real(wp), intent(inout) :: total(8, 0:last)
-    real(wp) :: brought(4, BLOCK), along_row(4), along_column(4, 3), s, g
+
+    call add_force(2, 2, n, w, volume, sxx, syy, sxy, last, total)
+    call add_force(3, 2, n, w, volume, sxx, syy, sxy, last, total)
+    call add_force(2, 3, n, w, volume, sxx, syy, sxy, last, total)
+    call add_force(3, 3, n, w, volume, sxx, syy, sxy, last, total)
+  end subroutine map_force
+
+  !> map_force for the points that reach so many `columns` and `rows`.
+  pure subroutine add_force(columns, rows, n, w, volume, sxx, syy, sxy, last, total)
+    integer, intent(in) :: columns, rows, n, last
+    type(weights_t), intent(in) :: w
+    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(inout) :: total(8, 0:last)
+    real(wp) :: with_gx(2), with_gy(2), a(2), b(2), s, g
+    integer(i8) :: points
     integer :: p, i, j, k, node
 
-    call pack_force(n, volume, sxx, syy, sxy, brought)
-    do p = 1, n
-      do i = 1, 3
-        s = w%sx(p, i)
-        g = w%gx(p, i)
-        along_column(:, i) = [g, g, s, s]
-      end do
-      do j = 1, 3
+    points = w%reaching(columns, rows)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
+      s = -volume(p)
+      with_gx = [s*sxx(p), s*sxy(p)]
+      with_gy = [s*sxy(p), s*syy(p)]
+      do j = 1, rows
         node = w%row(p, j) - 1
         s = w%sy(p, j)
         g = w%gy(p, j)
-        along_row = [s, s, g, g]
-        !$omp simd simdlen(4)
-        do k = 1, 4
-          along_row(k) = along_row(k)*brought(k, p)
+        !$omp simd simdlen(2)
+        do k = 1, 2
+          a(k) = s*with_gx(k)
+          b(k) = g*with_gy(k)
         end do
-        do i = 1, 3
-          !$omp simd simdlen(4)
-          do k = 1, 4
-            total(4 + k, node + i) = total(4 + k, node + i) + along_column(k, i)*along_row(k)
+        do i = 1, columns
+          s = w%sx(p, i)
+          g = w%gx(p, i)
+          !$omp simd simdlen(2)
+          do k = 1, 2
+            total(4 + k, node + i) = total(4 + k, node + i) + g*a(k) + s*b(k)
           end do
         end do
       end do
     end do
-  end subroutine map_force
+  end subroutine add_force
 
   !> map_momentum and map_force.
   pure subroutine map_momentum_and_force(n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
@@ -171,32 +204,35 @@ contains
     real(wp), intent(in) :: mass, vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: last
     real(wp), intent(inout) :: total(8, 0:last)
-    real(wp) :: momentum(4, BLOCK), force(4, BLOCK), brought(8, BLOCK)
 
     if (IS_WIDE) then
-      call pack_momentum(n, mass, vx, vy, momentum)
-      call pack_force(n, volume, sxx, syy, sxy, force)
-      brought(1:4, :n) = momentum(:, :n)
-      brought(5:8, :n) = force(:, :n)
-      call map_wide(n, w, brought, last, total)
+      call add_both(2, 2, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+      call add_both(3, 2, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+      call add_both(2, 3, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+      call add_both(3, 3, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
     else
       call map_momentum(n, w, mass, vx, vy, last, total)
       call map_force(n, w, volume, sxx, syy, sxy, last, total)
     end if
   end subroutine map_momentum_and_force
 
-  !> Adds what the points bring to all eight lanes of the nodes.
-  pure subroutine map_wide(n, w, brought, last, total)
-    integer, intent(in) :: n
+  !> add_momentum and add_force in all eight lanes of the nodes at once.
+  pure subroutine add_both(columns, rows, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+    integer, intent(in) :: columns, rows, n, last
     type(weights_t), intent(in) :: w
-    real(wp), intent(in) :: brought(8, BLOCK)
-    integer, intent(in) :: last
+    real(wp), intent(in) :: mass, vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     real(wp), intent(inout) :: total(8, 0:last)
-    real(wp) :: along_row(8), along_column(8, 3), s, g
+    real(wp) :: brought(8), along_row(8), along_column(8, 3), s, g
+    integer(i8) :: points
     integer :: p, i, j, k, node
 
-    do p = 1, n
-      do i = 1, 3
+    points = w%reaching(columns, rows)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
+      s = -volume(p)
+      brought = [mass, mass*vx(p), mass*vy(p), mass, s*sxx(p), s*sxy(p), s*sxy(p), s*syy(p)]
+      do i = 1, columns
         s = w%sx(p, i)
         g = w%gx(p, i)
         !$omp simd simdlen(8)
@@ -204,15 +240,15 @@ contains
           along_column(k, i) = merge(g, s, WITH_GX(k) > 0.0_wp)
         end do
       end do
-      do j = 1, 3
+      do j = 1, rows
         node = w%row(p, j) - 1
         s = w%sy(p, j)
         g = w%gy(p, j)
         !$omp simd simdlen(8)
         do k = 1, 8
-          along_row(k) = merge(g, s, WITH_GY(k) > 0.0_wp)*brought(k, p)
+          along_row(k) = merge(g, s, WITH_GY(k) > 0.0_wp)*brought(k)
         end do
-        do i = 1, 3
+        do i = 1, columns
           !$omp simd simdlen(8)
           do k = 1, 8
             total(k, node + i) = total(k, node + i) + along_column(k, i)*along_row(k)
@@ -220,7 +256,7 @@ contains
         end do
       end do
     end do
-  end subroutine map_wide
+  end subroutine add_both
 
   !> f_i += S m_p b_p for forces per mass `bx`, `by` in m/s^2.
   pure subroutine map_body_force(n, w, mass, bx, by, last, total)
@@ -241,39 +277,6 @@ contains
     end do
   end subroutine map_body_force
 
-  !> What `n` points bring to the mass and momentum of their nodes, in the order of total(1:4). The
-  !> mass comes twice: a constant 0 in the fourth lane would have all four stored one by one.
-  pure subroutine pack_momentum(n, mass, vx, vy, brought)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: mass, vx(n), vy(n)
-    real(wp), intent(inout) :: brought(4, BLOCK)
-    integer :: p
-
-    !$omp simd
-    do p = 1, n
-      brought(1, p) = mass
-      brought(2, p) = mass*vx(p)
-      brought(3, p) = mass*vy(p)
-      brought(4, p) = mass
-    end do
-  end subroutine pack_momentum
-
-  !> What they bring to the forces, in the order of total(5:8).
-  pure subroutine pack_force(n, volume, sxx, syy, sxy, brought)
-    integer, intent(in) :: n
-    real(wp), intent(in) :: volume(n), sxx(n), syy(n), sxy(n)
-    real(wp), intent(inout) :: brought(4, BLOCK)
-    integer :: p
-
-    !$omp simd
-    do p = 1, n
-      brought(1, p) = -volume(p)*sxx(p)
-      brought(2, p) = -volume(p)*sxy(p)
-      brought(3, p) = -volume(p)*sxy(p)
-      brought(4, p) = -volume(p)*syy(p)
-    end do
-  end subroutine pack_force
-
   !> value(p, :) = sum of S times motion(1:4).
   pure subroutine gather_motion(n, w, nx, ny, motion, value)
     integer, intent(in) :: n
@@ -281,30 +284,49 @@ contains
     integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(BLOCK, 4)
-    real(wp) :: found(4, BLOCK), v(4)
-    integer :: p, j, k, node
 
-    do p = 1, n
+    call take_motion(2, 2, w, nx, ny, motion, value)
+    call take_motion(3, 2, w, nx, ny, motion, value)
+    call take_motion(2, 3, w, nx, ny, motion, value)
+    call take_motion(3, 3, w, nx, ny, motion, value)
+  end subroutine gather_motion
+
+  !> gather_motion for the points that reach so many `columns` and `rows`.
+  pure subroutine take_motion(columns, rows, w, nx, ny, motion, value)
+    integer, intent(in) :: columns, rows, nx, ny
+    type(weights_t), intent(in) :: w
+    real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
+    real(wp), intent(inout) :: value(BLOCK, 4)
+    real(wp) :: v(4), row(4)
+    integer(i8) :: points
+    integer :: p, i, j, k, node
+
+    points = w%reaching(columns, rows)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
+      node = w%node(p) - 1
       v = 0.0_wp
-      node = w%node(p)
-      do j = 1, 3
+      do j = 1, rows
+        row = 0.0_wp
+        do i = 1, columns
+          !$omp simd simdlen(4)
+          do k = 1, 4
+            row(k) = row(k) + w%sx(p, i)*motion(k, node + i)
+          end do
+        end do
         !$omp simd simdlen(4)
         do k = 1, 4
-          v(k) = v(k) + w%sy(p, j)*(w%sx(p, 1)*motion(k, node) + w%sx(p, 2)*motion(k, node + 1) &
-            + w%sx(p, 3)*motion(k, node + 2))
+          v(k) = v(k) + w%sy(p, j)*row(k)
         end do
         node = node + nx + 1
       end do
-      found(:, p) = v
+      value(p, 1) = v(1)
+      value(p, 2) = v(2)
+      value(p, 3) = v(3)
+      value(p, 4) = v(4)
     end do
-    !$omp simd
-    do p = 1, n
-      value(p, 1) = found(1, p)
-      value(p, 2) = found(2, p)
-      value(p, 3) = found(3, p)
-      value(p, 4) = found(4, p)
-    end do
-  end subroutine gather_motion
+  end subroutine take_motion
 
   !> As gather_motion; also gradient(p, :) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy) of v =
   !> motion(3:4), in 1/s.
@@ -314,96 +336,116 @@ contains
     integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(BLOCK, 4), gradient(BLOCK, 4)
-    real(wp) :: found(8, BLOCK)
-    integer :: p
 
     if (IS_WIDE) then
-      call gather_wide(n, w, nx, ny, motion, found)
+      call take_lanes(2, 2, w, nx, ny, motion, value, gradient)
+      call take_lanes(3, 2, w, nx, ny, motion, value, gradient)
+      call take_lanes(2, 3, w, nx, ny, motion, value, gradient)
+      call take_lanes(3, 3, w, nx, ny, motion, value, gradient)
     else
-      call gather_narrow(n, w, nx, ny, motion, found)
+      call take_motion_and_gradient(2, 2, w, nx, ny, motion, value, gradient)
+      call take_motion_and_gradient(3, 2, w, nx, ny, motion, value, gradient)
+      call take_motion_and_gradient(2, 3, w, nx, ny, motion, value, gradient)
+      call take_motion_and_gradient(3, 3, w, nx, ny, motion, value, gradient)
     end if
-    !$omp simd
-    do p = 1, n
-      value(p, 1) = found(1, p)
-      value(p, 2) = found(2, p)
-      value(p, 3) = found(3, p)
-      value(p, 4) = found(4, p)
-      gradient(p, 1) = found(5, p)
-      gradient(p, 2) = found(6, p)
-      gradient(p, 3) = found(7, p)
-      gradient(p, 4) = found(8, p)
-    end do
   end subroutine gather_motion_and_gradient
 
-  !> found(:, p) = sums of all eight lanes.
-  pure subroutine gather_wide(n, w, nx, ny, motion, found)
-    integer, intent(in) :: n
+  !> gather_motion_and_gradient for the points that reach so many `columns` and `rows`, as sums of
+  !> all eight lanes.
+  pure subroutine take_lanes(columns, rows, w, nx, ny, motion, value, gradient)
+    integer, intent(in) :: columns, rows, nx, ny
     type(weights_t), intent(in) :: w
-    integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp), intent(inout) :: found(8, BLOCK)
-    !> Functions of x of the three columns of nodes, and of y of the three rows.
-    real(wp) :: column(8, 3), row(8, 3), sx, gx, sy, gy
-    integer :: p, i, k, low, middle, high
+    real(wp), intent(inout) :: value(BLOCK, 4), gradient(BLOCK, 4)
+    real(wp) :: found(8), row(8), along_column(8, 3), s, g
+    integer(i8) :: points
+    integer :: p, i, j, k, node
 
-    do p = 1, n
-      do i = 1, 3
-        sx = w%sx(p, i)
-        gx = w%gx(p, i)
-        sy = w%sy(p, i)
-        gy = w%gy(p, i)
+    points = w%reaching(columns, rows)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
+      do i = 1, columns
+        s = w%sx(p, i)
+        g = w%gx(p, i)
         !$omp simd simdlen(8)
         do k = 1, 8
-          column(k, i) = merge(gx, sx, WITH_GX(k) > 0.0_wp)
-          row(k, i) = merge(gy, sy, WITH_GY(k) > 0.0_wp)
+          along_column(k, i) = merge(g, s, WITH_GX(k) > 0.0_wp)
         end do
       end do
-      low = w%node(p)
-      middle = low + nx + 1
-      high = middle + nx + 1
-      !$omp simd simdlen(8)
-      do k = 1, 8
-        found(k, p) = row(k, 1)*(column(k, 1)*motion(k, low) &
-          + column(k, 2)*motion(k, low + 1) + column(k, 3)*motion(k, low + 2)) &
-          + row(k, 2)*(column(k, 1)*motion(k, middle) &
-          + column(k, 2)*motion(k, middle + 1) + column(k, 3)*motion(k, middle + 2)) &
-          + row(k, 3)*(column(k, 1)*motion(k, high) &
-          + column(k, 2)*motion(k, high + 1) + column(k, 3)*motion(k, high + 2))
-      end do
-    end do
-  end subroutine gather_wide
-
-  !> The same from lanes 1 to 4 alone.
-  pure subroutine gather_narrow(n, w, nx, ny, motion, found)
-    integer, intent(in) :: n
-    type(weights_t), intent(in) :: w
-    integer, intent(in) :: nx, ny
-    real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp), intent(inout) :: found(8, BLOCK)
-    real(wp) :: row, slope, v(4), gx(4), gy(4)
-    integer :: p, j, k, node
-
-    do p = 1, n
-      v = 0.0_wp
-      gx = 0.0_wp
-      gy = 0.0_wp
-      node = w%node(p)
-      do j = 1, 3
-        !$omp simd simdlen(4) private(row, slope)
-        do k = 1, 4
-          row = w%sx(p, 1)*motion(k, node) + w%sx(p, 2)*motion(k, node + 1) &
-            + w%sx(p, 3)*motion(k, node + 2)
-          slope = w%gx(p, 1)*motion(k, node) + w%gx(p, 2)*motion(k, node + 1) &
-            + w%gx(p, 3)*motion(k, node + 2)
-          v(k) = v(k) + w%sy(p, j)*row
-          gx(k) = gx(k) + w%sy(p, j)*slope
-          gy(k) = gy(k) + w%gy(p, j)*row
+      node = w%node(p) - 1
+      found = 0.0_wp
+      do j = 1, rows
+        row = 0.0_wp
+        do i = 1, columns
+          !$omp simd simdlen(8)
+          do k = 1, 8
+            row(k) = row(k) + along_column(k, i)*motion(k, node + i)
+          end do
+        end do
+        s = w%sy(p, j)
+        g = w%gy(p, j)
+        !$omp simd simdlen(8)
+        do k = 1, 8
+          found(k) = found(k) + merge(g, s, WITH_GY(k) > 0.0_wp)*row(k)
         end do
         node = node + nx + 1
       end do
-      found(1:4, p) = v
-      found(5:6, p) = gx(3:4)
-      found(7:8, p) = gy(3:4)
+      value(p, 1) = found(1)
+      value(p, 2) = found(2)
+      value(p, 3) = found(3)
+      value(p, 4) = found(4)
+      gradient(p, 1) = found(5)
+      gradient(p, 2) = found(6)
+      gradient(p, 3) = found(7)
+      gradient(p, 4) = found(8)
     end do
-  end subroutine gather_narrow
+  end subroutine take_lanes
+
+  !> The same from lanes 1 to 4 alone.
+  pure subroutine take_motion_and_gradient(columns, rows, w, nx, ny, motion, value, gradient)
+    integer, intent(in) :: columns, rows, nx, ny
+    type(weights_t), intent(in) :: w
+    real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
+    real(wp), intent(inout) :: value(BLOCK, 4), gradient(BLOCK, 4)
+    real(wp) :: v(4), gx(4), gy(4), row(4), slope(4)
+    integer(i8) :: points
+    integer :: p, i, j, k, node
+
+    points = w%reaching(columns, rows)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
+      node = w%node(p) - 1
+      v = 0.0_wp
+      gx = 0.0_wp
+      gy = 0.0_wp
+      do j = 1, rows
+        row = 0.0_wp
+        slope = 0.0_wp
+        do i = 1, columns
+          !$omp simd simdlen(4)
+          do k = 1, 4
+            row(k) = row(k) + w%sx(p, i)*motion(k, node + i)
+            slope(k) = slope(k) + w%gx(p, i)*motion(k, node + i)
+          end do
+        end do
+        !$omp simd simdlen(4)
+        do k = 1, 4
+          v(k) = v(k) + w%sy(p, j)*row(k)
+          gx(k) = gx(k) + w%sy(p, j)*slope(k)
+          gy(k) = gy(k) + w%gy(p, j)*row(k)
+        end do
+        node = node + nx + 1
+      end do
+      value(p, 1) = v(1)
+      value(p, 2) = v(2)
+      value(p, 3) = v(3)
+      value(p, 4) = v(4)
+      gradient(p, 1) = gx(3)
+      gradient(p, 2) = gx(4)
+      gradient(p, 3) = gy(3)
+      gradient(p, 4) = gy(4)
+    end do
+  end subroutine take_motion_and_gradient
 end module sg_transfer

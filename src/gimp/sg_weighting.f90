@@ -16,7 +16,7 @@
 !>   where k is a wall, the node behind it is taken to continue the line through the next two, which
 !>   makes S linear there, (max(-d,0), 1-|d|, max(d,0)): the wall is then held exactly.
 module sg_weighting
-  use sg_kinds, only: wp
+  use sg_kinds, only: i8, wp
   use sg_rounding, only: COARSENESS
   implicit none
   private
@@ -36,6 +36,9 @@ module sg_weighting
   !> they are known to 1e-3 here, on 160 cells.
   real(wp), parameter :: LEAST_FIXED_WIDTH = 1.0e-11_wp*COARSENESS
 
+  integer :: number
+  !> The bit that stands for each point of a block, which has no more points than an integer bits.
+  integer(i8), parameter :: BIT(BLOCK) = [(shiftl(1_i8, number - 1), number=1, BLOCK)]
   !> Weights of up to BLOCK points.
   type :: weights_t
     !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1).
@@ -44,8 +47,11 @@ module sg_weighting
     integer :: row(BLOCK, 3)
     !> Weights and slopes (1/m) along x and along y: point, node of the stencil.
     real(wp) :: sx(BLOCK, 3), sy(BLOCK, 3), gx(BLOCK, 3), gy(BLOCK, 3)
+    !> Points, as bits, whose stencils reach that many columns and rows of nodes: what they bring to
+    !> the third is often zero.
+    integer(i8) :: reaching(2:3, 2:3)
   contains
-    procedure :: number_nodes
+    procedure :: find_stencils
     procedure :: number_rows
     procedure :: keep_rows
   end type weights_t
@@ -78,17 +84,44 @@ module sg_weighting
 
 contains
 
-  !> Numbers the first nodes of `n` points in a grid whose rows end with node `nx`.
-  pure subroutine number_nodes(this, n, nx)
+  !> Numbers the first nodes of `n` points in a grid whose rows end with node `nx`, and sorts the
+  !> points by what their stencils reach.
+  pure subroutine find_stencils(this, n, nx)
     class(weights_t), intent(inout) :: this
     integer, intent(in) :: n, nx
+    integer(i8) :: wide, high, all_points
     integer :: p
 
     !$omp simd
     do p = 1, n
       this%node(p) = this%i(p) + this%j(p)*(nx + 1)
     end do
-  end subroutine number_nodes
+    wide = those_with_slope(n, this%gx(:, 3))
+    high = those_with_slope(n, this%gy(:, 3))
+    all_points = maskr(n, kind=i8)
+    this%reaching(2, 2) = iand(all_points, not(ior(wide, high)))
+    this%reaching(3, 2) = iand(wide, not(high))
+    this%reaching(2, 3) = iand(high, not(wide))
+    this%reaching(3, 3) = iand(wide, high)
+  end subroutine find_stencils
+
+  !> The points among the first `n` whose `slope` at a node is not zero, as bits: wherever a weight
+  !> is not zero, its slope is not either.
+  pure function those_with_slope(n, slope) result(points)
+    integer, intent(in) :: n
+    real(wp), intent(in) :: slope(BLOCK)
+    integer(i8) :: points, its_bit
+    real(wp) :: steepness
+    integer :: p
+
+    points = 0_i8
+    !$omp simd private(its_bit, steepness) reduction(ior:points)
+    do p = 1, n
+      its_bit = BIT(p)
+      steepness = abs(slope(p))
+      points = ior(points, merge(its_bit, 0_i8, steepness > 0.0_wp))
+    end do
+  end function those_with_slope
 
   !> Numbers the first nodes of all three rows, for mapping.
   pure subroutine number_rows(this, n, nx)
