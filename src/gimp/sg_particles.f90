@@ -65,9 +65,6 @@ module sg_particles
   contains
     procedure :: init => init_particles
     procedure :: is_measured
-    procedure :: has_plastic_strain
-    procedure :: has_deformation
-    procedure :: has_cracks
     procedure :: track_cracks
     procedure :: track_plastic_strain
     procedure :: track_deformation
@@ -111,32 +108,11 @@ contains
     end do
   end function is_measured
 
-  !> Is the plastic strain kept?
-  pure function has_plastic_strain(this) result(has)
-    class(particles_t), intent(in) :: this
-    logical :: has
-    has = size(this%plastic_strain) == this%count
-  end function has_plastic_strain
-
-  !> Is the deformation gradient kept?
-  pure function has_deformation(this) result(has)
-    class(particles_t), intent(in) :: this
-    logical :: has
-    has = size(this%fxx) == this%count
-  end function has_deformation
-
-  !> Are cracks kept?
-  pure function has_cracks(this) result(has)
-    class(particles_t), intent(in) :: this
-    logical :: has
-    has = size(this%crack, 2) == this%count
-  end function has_cracks
-
   !> Keeps cracks from now on, from none.
   subroutine track_cracks(this)
     class(particles_t), intent(inout) :: this
 
-    if (this%has_cracks()) return
+    if (size(this%crack) > 0) return
     deallocate (this%crack)
     allocate (this%crack(4, this%count))
     this%crack = 0.0_wp
@@ -146,7 +122,7 @@ contains
   subroutine track_plastic_strain(this)
     class(particles_t), intent(inout) :: this
 
-    if (this%has_plastic_strain()) return
+    if (size(this%plastic_strain) > 0) return
     deallocate (this%plastic_strain)
     allocate (this%plastic_strain(this%count))
     this%plastic_strain = 0.0_wp
@@ -156,7 +132,7 @@ contains
   subroutine track_deformation(this)
     class(particles_t), intent(inout) :: this
 
-    if (this%has_deformation()) return
+    if (size(this%fxx) > 0) return
     deallocate (this%fxx, this%fxy, this%fyx, this%fyy)
     allocate (this%fxx(this%count), this%fxy(this%count), this%fyx(this%count), &
       this%fyy(this%count))

@@ -39,7 +39,7 @@ contains
     n = last - first + 1
     twice = 0.0_wp
     associate (p => particles)
-      if (p%has_deformation()) call update_deformation(n, time_step, gradient, &
+      if (size(p%fxx) > 0) call update_deformation(n, time_step, gradient, &
         p%fxx(first:last), p%fxy(first:last), p%fyx(first:last), p%fyy(first:last))
       if (material%model == MODEL_NEO_HOOKEAN) then
         call find_strain(n, time_step, gradient, strain)
@@ -52,7 +52,7 @@ contains
           if (material%is_brittle) call release_block(p, material, first, last)
           call close_gap(n, time_step, gradient, p%gap(first:last), share)
         end if
-        if (p%has_cracks()) call turn_cracks(n, time_step, gradient, p%crack(:, first:last))
+        if (size(p%crack) > 0) call turn_cracks(n, time_step, gradient, p%crack(:, first:last))
         if (size(p%young) > 0) then
           call predict_varied(p, material, first, last, time_step, gradient, share, strain, twice)
         else
@@ -176,7 +176,7 @@ contains
     integer :: n
 
     n = last - first + 1
-    if (p%has_cracks()) closed(:n) = crack_opening(n, material%bulk, p%crack(:, first:last))
+    if (size(p%crack) > 0) closed(:n) = crack_opening(n, material%bulk, p%crack(:, first:last))
     if (size(p%young) > 0) then
       gap(:n) = p%gap(first:last)
       call return_nominal(p, material, first, last)
@@ -185,7 +185,7 @@ contains
     else
       call return_nominal(p, material, first, last)
     end if
-    if (p%has_cracks()) then
+    if (size(p%crack) > 0) then
       closed(:n) = closed(:n) - crack_opening(n, material%bulk, p%crack(:, first:last))
       if (.not. any(abs(closed(:n)) > 0.0_wp)) return
       if (size(p%young) > 0) closed(:n) = closed(:n)/stiffness(p, material, first, last)
@@ -202,14 +202,14 @@ contains
     integer :: n, last_crack
 
     n = last - first + 1
-    last_crack = merge(last, first - 1, p%has_cracks())
+    last_crack = merge(last, first - 1, size(p%crack) > 0)
     if (material%softens) then
       call return_softening(n, material, first_strength(p, material, first, last), &
         p%plastic_strain(first:last), p%sxx(first:last), p%syy(first:last), p%szz(first:last), &
         p%sxy(first:last), p%gap(first:last), p%crack(:, first:last_crack))
       return
     end if
-    if (p%has_plastic_strain()) then
+    if (size(p%plastic_strain) > 0) then
       trial(:n, 1) = p%sxx(first:last)
       trial(:n, 2) = p%syy(first:last)
       trial(:n, 3) = p%szz(first:last)
@@ -233,7 +233,7 @@ contains
         p%syy(first:last), p%szz(first:last), p%sxy(first:last), p%gap(first:last))
     case default ! elastic: nothing to return to
     end select
-    if (p%has_plastic_strain()) then
+    if (size(p%plastic_strain) > 0) then
       strain(:n) = plastic_strain_increment(n, material%shear, trial, p%sxx(first:last), &
         p%syy(first:last), p%szz(first:last), p%sxy(first:last))
       if (size(p%young) > 0) strain(:n) = strain(:n)/stiffness(p, material, first, last)
