@@ -22,26 +22,21 @@ if(SGIMP_ARCH_FLAG AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # A node of the grid is eight numbers: one vector where the processor has such.
   list(APPEND SGIMP_ARCH_FLAG -mprefer-vector-width=512)
 endif()
-# What the instruction set holds: the longest vectors, for kernels that have a form for each length, and what the
-# program looks for when it starts, so that a processor without it gets a message and not an illegal instruction.
-set(SGIMP_VECTOR_BYTES 32)
+# What the program looks for when it starts, so that a processor without it gets a message and not an illegal
+# instruction.
 set(SGIMP_NEEDS "")
 if(SGIMP_ARCH_FLAG AND CMAKE_BUILD_TYPE STREQUAL "Release")
   execute_process(COMMAND ${CMAKE_C_COMPILER} -march=${SGIMP_ARCH} -dM -E -x c /dev/null
     OUTPUT_VARIABLE macros RESULT_VARIABLE status ERROR_QUIET)
   if(NOT status EQUAL 0)
-    message(WARNING "The C compiler does not know -march=${SGIMP_ARCH}: short vectors, no check of the processor.")
+    message(WARNING "The C compiler does not know -march=${SGIMP_ARCH}: no check of the processor.")
   endif()
   foreach(feature AVX2 FMA AVX512F AVX512DQ AVX512BW AVX512VL)
     if(macros MATCHES "__${feature}__")
       list(APPEND SGIMP_NEEDS SGIMP_NEEDS_${feature})
     endif()
   endforeach()
-  if("SGIMP_NEEDS_AVX512F" IN_LIST SGIMP_NEEDS)
-    set(SGIMP_VECTOR_BYTES 64)
-  endif()
 endif()
-configure_file(src/base/sg_vectors.f90.in ${PROJECT_BINARY_DIR}/generated/sg_vectors.f90 @ONLY)
 
 set(SGIMP_FLAGS_ALWAYS "")
 set(SGIMP_FLAGS_RELEASE "")

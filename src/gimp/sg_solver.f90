@@ -102,7 +102,6 @@ module sg_solver
     procedure, private :: sweep_stress
     procedure, private :: average_pressure
     procedure, private :: average_block
-    procedure, private :: map_varied
     procedure, private :: push_points
   end type solver_t
 
@@ -426,10 +425,8 @@ contains
           this%materials(body%material), first, last)
       end if
       if (sweep%move_with > 0) then
-        call move_points(n, time_step, sweep%move_with, value, p%mass(first), &
+        call move_points(n, time_step, sweep%move_with, value, p%mass(first:last), &
           p%vx(first:last), p%vy(first:last), p%x(first:last), p%y(first:last), tally)
-        if (size(p%density) > 0) call add_heavier(n, sweep%move_with, value, p%mass(first:last), &
-          p%vx(first:last), p%vy(first:last), tally)
         ! Only now: what was mapped with a domain has to be gathered with it, or momentum is lost.
         if (this%stretches_domains) call this%stretch_domains(body, first, last)
       end if
@@ -441,14 +438,12 @@ contains
       end if
       if (this%averages_cells .and. sweep%map_force) then
         call this%average_block(sweep, first, last, w)
-      else if (size(p%density) > 0) then
-        call this%map_varied(sweep, first, last, w)
       else if (sweep%map_momentum .and. sweep%map_force) then
-        call map_momentum_and_force(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
+        call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
           p%volume(first:last), p%sxx(first:last), p%syy(first:last), p%sxy(first:last), &
           g%last_node, g%total_store(g%total_start))
       else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
+        call map_momentum(n, w, p%mass(first:last), p%vx(first:last), p%vy(first:last), &
           g%last_node, g%total_store(g%total_start))
       else if (sweep%map_force) then
         call map_force(n, w, p%volume(first:last), p%sxx(first:last), p%syy(first:last), &
@@ -475,41 +470,12 @@ contains
     associate (p => this%particles, g => this%grid)
       change(:n) = this%cells%mean(n, p%x(first:last), p%y(first:last)) &
         - 0.5_wp*(p%sxx(first:last) + p%syy(first:last))
-      if (sweep%map_momentum .and. size(p%density) > 0) then
-        call this%map_varied(sweep_t(map_momentum=.true.), first, last, w)
-      else if (sweep%map_momentum) then
-        call map_momentum(n, w, p%mass(first), p%vx(first:last), p%vy(first:last), &
-          g%last_node, g%total_store(g%total_start))
-      end if
+      if (sweep%map_momentum) call map_momentum(n, w, p%mass(first:last), p%vx(first:last), &
+        p%vy(first:last), g%last_node, g%total_store(g%total_start))
       call map_force(n, w, p%volume(first:last), p%sxx(first:last) + change(:n), p%syy(first:last) &
         + change(:n), p%sxy(first:last), g%last_node, g%total_store(g%total_start))
     end associate
   end subroutine average_block
-
-  !> Maps a block whose points may differ in mass: to the nodes, one that is heavier than the first
-  !> by a factor is as one as heavy with weights that are larger by it.
-  subroutine map_varied(this, sweep, first, last, w)
-    class(solver_t), intent(inout) :: this
-    type(sweep_t), intent(in) :: sweep
-    integer, intent(in) :: first, last
-    type(weights_t), intent(in) :: w
-    type(weights_t) :: heavy
-    integer :: n, j
-
-    n = last - first + 1
-    associate (p => this%particles, g => this%grid)
-      if (sweep%map_momentum) then
-        heavy = w
-        do j = 1, 3
-          heavy%sy(:n, j) = w%sy(:n, j)*(p%mass(first:last)/p%mass(first))
-        end do
-        call map_momentum(n, heavy, p%mass(first), p%vx(first:last), p%vy(first:last), &
-          g%last_node, g%total_store(g%total_start))
-      end if
-      if (sweep%map_force) call map_force(n, w, p%volume(first:last), p%sxx(first:last), &
-        p%syy(first:last), p%sxy(first:last), g%last_node, g%total_store(g%total_start))
-    end associate
-  end subroutine map_varied
 
   !> Adds the body force of the manufactured solution, which knows of one density, to the nodes.
   !> Adds its work in J/m to `work`.
@@ -580,22 +546,10 @@ contains
     end do
   end subroutine update_velocity
 
-  !> What the tally is told by move_points misses where points of a block are not as heavy as the
-  !> first: their differences times v^2/2.
-  pure subroutine add_heavier(n, k, value, mass, vx, vy, tally)
-    integer, intent(in) :: n, k
-    real(wp), intent(in) :: value(BLOCK, 4), mass(n), vx(n), vy(n)
-    type(tally_t), intent(inout) :: tally
-
-    tally%motion_energy = tally%motion_energy + 0.5_wp*sum((mass - mass(1)) &
-      *(value(:n, k)**2 + value(:n, k + 1)**2))
-    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*sum((mass - mass(1))*(vx**2 + vy**2))
-  end subroutine add_heavier
-
-  !> x_p += v dt with v = value(:, k:k+1) for points of the same `mass`, kg/m; adds to the tally.
+  !> x_p += v dt with v = value(:, k:k+1); adds to the tally.
   pure subroutine move_points(n, time_step, k, value, mass, vx, vy, x, y, tally)
     integer, intent(in) :: n, k
-    real(wp), intent(in) :: time_step, value(BLOCK, 4), mass, vx(n), vy(n)
+    real(wp), intent(in) :: time_step, value(BLOCK, 4), mass(n), vx(n), vy(n)
     real(wp), intent(inout) :: x(n), y(n)
     type(tally_t), intent(inout) :: tally
     real(wp) :: x_min, x_max, y_min, y_max, motion, energy, speed_squared, squared
@@ -611,19 +565,19 @@ contains
     do p = 1, n
       x(p) = x(p) + time_step*value(p, k)
       y(p) = y(p) + time_step*value(p, k + 1)
-      motion = motion + value(p, k)*value(p, k) + value(p, k + 1)*value(p, k + 1)
+      motion = motion + mass(p)*(value(p, k)*value(p, k) + value(p, k + 1)*value(p, k + 1))
       x_min = min(x_min, x(p))
       x_max = max(x_max, x(p))
       y_min = min(y_min, y(p))
       y_max = max(y_max, y(p))
       squared = vx(p)*vx(p) + vy(p)*vy(p)
       speed_squared = max(speed_squared, squared)
-      energy = energy + squared
+      energy = energy + mass(p)*squared
     end do
     tally%x_min = x_min; tally%x_max = x_max
     tally%y_min = y_min; tally%y_max = y_max
     tally%speed_squared = speed_squared
-    tally%motion_energy = tally%motion_energy + 0.5_wp*mass*motion
-    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*mass*energy
+    tally%motion_energy = tally%motion_energy + 0.5_wp*motion
+    tally%kinetic_energy = tally%kinetic_energy + 0.5_wp*energy
   end subroutine move_points
 end module sg_solver

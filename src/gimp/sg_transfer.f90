@@ -1,6 +1,6 @@
 !> Transfers between points and nodes, a block of points at a time.
 !>
-!> Node data are interleaved so that one node is one or two vectors:
+!> Node data are interleaved so that one node is one vector of eight numbers, or two of four:
 !>   total(1:8)   mass, momentum x, momentum y, mass, then the force in two parts, fx + fx',
 !>                fy + fy': fx, fy, fx', fy'                           (sums over points)
 !>   motion(1:8)  two velocities, whose meaning the time scheme chooses, the second three times:
@@ -13,16 +13,16 @@
 !>
 !> With the force in two parts and the second velocity thrice, every lane of total and of motion is
 !> one product (a function of x) (a function of y) (what is mapped or gathered): S S for lanes 1 to
-!> 4, S' S for 5 and 6, S S' for 7 and 8. A processor with vectors of eight numbers does a node in
-!> one multiplication and addition (the wide forms, where VECTOR_BYTES allows); with shorter ones
-!> momentum and force are mapped one after the other, four lanes each.
+!> 4, S' S for 5 and 6, S S' for 7 and 8. So a node is one multiplication and addition of eight
+!> lanes.
 !>
-!> Nodes are counted along rows: node (i, j) is i + j (nx + 1). What a point brings to the nodes is
-!> laid out for the whole block first: vectors put together from numbers just computed would stall
-!> the loads behind them.
+!> A point reaches two or three columns of nodes and as many rows. Those of a block that reach the
+!> same go one after the other, through one text with the number of columns and rows as arguments:
+!> they are constants wherever it is called, and compiled as such once it is inlined there.
+!>
+!> Nodes are counted along rows: node (i, j) is i + j (nx + 1).
 module sg_transfer
   use sg_kinds, only: dp, i8, wp
-  use sg_vectors, only: VECTOR_BYTES
   use sg_weighting, only: axis_t, BLOCK, weights_t
   implicit none
   private
@@ -30,8 +30,6 @@ module sg_transfer
   public :: map_momentum, map_gradient, map_force, map_momentum_and_force, map_body_force, &
     gather_motion, gather_motion_and_gradient
 
-  !> Eight lanes are one vector.
-  logical, parameter :: IS_WIDE = 8*storage_size(1.0_wp) <= 8*VECTOR_BYTES
   !> Lanes that go with the slope along x and along y: above 0.
   real(wp), parameter :: WITH_GX(8) = real([0, 0, 0, 0, 1, 1, 0, 0], wp)
   real(wp), parameter :: WITH_GY(8) = real([0, 0, 0, 0, 0, 0, 1, 1], wp)
@@ -42,8 +40,8 @@ contains
   pure subroutine map_momentum(n, w, mass, vx, vy, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
-    !> Of one point, kg/m; [n], m/s.
-    real(wp), intent(in) :: mass, vx(n), vy(n)
+    !> [n], kg/m and m/s.
+    real(wp), intent(in) :: mass(n), vx(n), vy(n)
     !> Last node of `total`.
     integer, intent(in) :: last
     real(wp), intent(inout) :: total(8, 0:last)
@@ -58,7 +56,7 @@ contains
   pure subroutine add_momentum(columns, rows, n, w, mass, vx, vy, last, total)
     integer, intent(in) :: columns, rows, n, last
     type(weights_t), intent(in) :: w
-    real(wp), intent(in) :: mass, vx(n), vy(n)
+    real(wp), intent(in) :: mass(n), vx(n), vy(n)
     real(wp), intent(inout) :: total(8, 0:last)
     real(wp) :: brought(4), along_row(4), s
     integer(i8) :: points
@@ -68,7 +66,7 @@ contains
     do while (points /= 0_i8)
       p = trailz(points) + 1
       points = iand(points, points - 1_i8)
-      brought = [mass, mass*vx(p), mass*vy(p), mass]
+      brought = [mass(p), mass(p)*vx(p), mass(p)*vy(p), mass(p)]
       do j = 1, rows
         node = w%row(p, j) - 1
         s = w%sy(p, j)
@@ -201,26 +199,21 @@ contains
   pure subroutine map_momentum_and_force(n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
     integer, intent(in) :: n
     type(weights_t), intent(in) :: w
-    real(wp), intent(in) :: mass, vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     integer, intent(in) :: last
     real(wp), intent(inout) :: total(8, 0:last)
 
-    if (IS_WIDE) then
-      call add_both(2, 2, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
-      call add_both(3, 2, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
-      call add_both(2, 3, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
-      call add_both(3, 3, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
-    else
-      call map_momentum(n, w, mass, vx, vy, last, total)
-      call map_force(n, w, volume, sxx, syy, sxy, last, total)
-    end if
+    call add_both(2, 2, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+    call add_both(3, 2, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+    call add_both(2, 3, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
+    call add_both(3, 3, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
   end subroutine map_momentum_and_force
 
-  !> add_momentum and add_force in all eight lanes of the nodes at once.
+  !> map_momentum_and_force for the points that reach so many `columns` and `rows`.
   pure subroutine add_both(columns, rows, n, w, mass, vx, vy, volume, sxx, syy, sxy, last, total)
     integer, intent(in) :: columns, rows, n, last
     type(weights_t), intent(in) :: w
-    real(wp), intent(in) :: mass, vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
+    real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     real(wp), intent(inout) :: total(8, 0:last)
     real(wp) :: brought(8), along_row(8), along_column(8, 3), s, g
     integer(i8) :: points
@@ -231,7 +224,8 @@ contains
       p = trailz(points) + 1
       points = iand(points, points - 1_i8)
       s = -volume(p)
-      brought = [mass, mass*vx(p), mass*vy(p), mass, s*sxx(p), s*sxy(p), s*sxy(p), s*syy(p)]
+      brought = [mass(p), mass(p)*vx(p), mass(p)*vy(p), mass(p), s*sxx(p), s*sxy(p), s*sxy(p), &
+        s*syy(p)]
       do i = 1, columns
         s = w%sx(p, i)
         g = w%gx(p, i)
@@ -337,22 +331,14 @@ contains
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(BLOCK, 4), gradient(BLOCK, 4)
 
-    if (IS_WIDE) then
-      call take_lanes(2, 2, w, nx, ny, motion, value, gradient)
-      call take_lanes(3, 2, w, nx, ny, motion, value, gradient)
-      call take_lanes(2, 3, w, nx, ny, motion, value, gradient)
-      call take_lanes(3, 3, w, nx, ny, motion, value, gradient)
-    else
-      call take_motion_and_gradient(2, 2, w, nx, ny, motion, value, gradient)
-      call take_motion_and_gradient(3, 2, w, nx, ny, motion, value, gradient)
-      call take_motion_and_gradient(2, 3, w, nx, ny, motion, value, gradient)
-      call take_motion_and_gradient(3, 3, w, nx, ny, motion, value, gradient)
-    end if
+    call take_motion_and_gradient(2, 2, w, nx, ny, motion, value, gradient)
+    call take_motion_and_gradient(3, 2, w, nx, ny, motion, value, gradient)
+    call take_motion_and_gradient(2, 3, w, nx, ny, motion, value, gradient)
+    call take_motion_and_gradient(3, 3, w, nx, ny, motion, value, gradient)
   end subroutine gather_motion_and_gradient
 
-  !> gather_motion_and_gradient for the points that reach so many `columns` and `rows`, as sums of
-  !> all eight lanes.
-  pure subroutine take_lanes(columns, rows, w, nx, ny, motion, value, gradient)
+  !> gather_motion_and_gradient for the points that reach so many `columns` and `rows`.
+  pure subroutine take_motion_and_gradient(columns, rows, w, nx, ny, motion, value, gradient)
     integer, intent(in) :: columns, rows, nx, ny
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
@@ -399,53 +385,6 @@ contains
       gradient(p, 2) = found(6)
       gradient(p, 3) = found(7)
       gradient(p, 4) = found(8)
-    end do
-  end subroutine take_lanes
-
-  !> The same from lanes 1 to 4 alone.
-  pure subroutine take_motion_and_gradient(columns, rows, w, nx, ny, motion, value, gradient)
-    integer, intent(in) :: columns, rows, nx, ny
-    type(weights_t), intent(in) :: w
-    real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
-    real(wp), intent(inout) :: value(BLOCK, 4), gradient(BLOCK, 4)
-    real(wp) :: v(4), gx(4), gy(4), row(4), slope(4)
-    integer(i8) :: points
-    integer :: p, i, j, k, node
-
-    points = w%reaching(columns, rows)
-    do while (points /= 0_i8)
-      p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
-      node = w%node(p) - 1
-      v = 0.0_wp
-      gx = 0.0_wp
-      gy = 0.0_wp
-      do j = 1, rows
-        row = 0.0_wp
-        slope = 0.0_wp
-        do i = 1, columns
-          !$omp simd simdlen(4)
-          do k = 1, 4
-            row(k) = row(k) + w%sx(p, i)*motion(k, node + i)
-            slope(k) = slope(k) + w%gx(p, i)*motion(k, node + i)
-          end do
-        end do
-        !$omp simd simdlen(4)
-        do k = 1, 4
-          v(k) = v(k) + w%sy(p, j)*row(k)
-          gx(k) = gx(k) + w%sy(p, j)*slope(k)
-          gy(k) = gy(k) + w%gy(p, j)*row(k)
-        end do
-        node = node + nx + 1
-      end do
-      value(p, 1) = v(1)
-      value(p, 2) = v(2)
-      value(p, 3) = v(3)
-      value(p, 4) = v(4)
-      gradient(p, 1) = gx(3)
-      gradient(p, 2) = gx(4)
-      gradient(p, 3) = gy(3)
-      gradient(p, 4) = gy(4)
     end do
   end subroutine take_motion_and_gradient
 end module sg_transfer

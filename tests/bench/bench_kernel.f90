@@ -129,7 +129,7 @@ contains
               call update_stress(p, m, first, last, 1.0e-3_wp, gradient, work)
               wave_squared = max(wave_squared, wave_speed_squared(p, m, first, last))
             case (4)
-              call map_momentum_and_force(n, w, p%mass(first), p%vx(first:last), &
+              call map_momentum_and_force(n, w, p%mass(first:last), p%vx(first:last), &
                 p%vy(first:last), &
                                           p%volume(first:last), p%sxx(first:last), &
                                           p%syy(first:last), &
