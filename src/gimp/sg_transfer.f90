@@ -157,7 +157,8 @@ contains
     call add_force(3, 3, n, w, volume, sxx, syy, sxy, last, total)
   end subroutine map_force
 
-  !> map_force for the points that reach so many `columns` and `rows`.
+  !> map_force for the points that reach so many `columns` and `rows`: both parts of the force into
+  !> lanes 5 and 6, since two lanes and two products are as fast as four of one.
   pure subroutine add_force(columns, rows, n, w, volume, sxx, syy, sxy, last, total)
     integer, intent(in) :: columns, rows, n, last
     type(weights_t), intent(in) :: w

@@ -21,11 +21,11 @@ module sg_weighting
   implicit none
   private
 
-  public :: weights_t, axis_t, axis_weights_interface, BLOCK, NO_WALL
+  public :: weights_t, axis_t, axis_weights_interface, points_above, BLOCK, NO_WALL
   public :: gimp_axis_weights, cpgimp_axis_weights, linear_axis_weights, bspline_axis_weights
 
   !> Points that a kernel handles at a time: long enough to fill vector units, short enough for the
-  !> first cache.
+  !> first cache, and no more than an integer has bits, which stand for points of a block.
   integer, parameter :: BLOCK = 64
   !> `first_wall` or `last_wall` of an axis that is open there.
   integer, parameter :: NO_WALL = -1
@@ -36,9 +36,9 @@ module sg_weighting
   !> they are known to 1e-3 here, on 160 cells.
   real(wp), parameter :: LEAST_FIXED_WIDTH = 1.0e-11_wp*COARSENESS
 
-  integer :: number
-  !> The bit that stands for each point of a block, which has no more points than an integer bits.
-  integer(i8), parameter :: BIT(BLOCK) = [(shiftl(1_i8, number - 1), number=1, BLOCK)]
+  integer :: point
+  integer(i8), parameter :: BIT(BLOCK) = [(shiftl(1_i8, point - 1), point=1, BLOCK)]
+
   !> Weights of up to BLOCK points.
   type :: weights_t
     !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1).
@@ -96,8 +96,9 @@ contains
     do p = 1, n
       this%node(p) = this%i(p) + this%j(p)*(nx + 1)
     end do
-    wide = those_with_slope(n, this%gx(:, 3))
-    high = those_with_slope(n, this%gy(:, 3))
+    ! The slope of the last node of a stencil is positive, or zero like its weight.
+    wide = points_above(n, this%gx(:, 3), 0.0_wp)
+    high = points_above(n, this%gy(:, 3), 0.0_wp)
     all_points = maskr(n, kind=i8)
     this%reaching(2, 2) = iand(all_points, not(ior(wide, high)))
     this%reaching(3, 2) = iand(wide, not(high))
@@ -105,23 +106,23 @@ contains
     this%reaching(3, 3) = iand(wide, high)
   end subroutine find_stencils
 
-  !> The points among the first `n` whose `slope` at a node is not zero, as bits: wherever a weight
-  !> is not zero, its slope is not either.
-  pure function those_with_slope(n, slope) result(points)
+  !> The points among the first `n` of a block whose `value` is above `limit`, as bits: point p is
+  !> bit p - 1.
+  pure function points_above(n, value, limit) result(points)
     integer, intent(in) :: n
-    real(wp), intent(in) :: slope(BLOCK)
+    real(wp), intent(in) :: value(BLOCK), limit
     integer(i8) :: points, its_bit
-    real(wp) :: steepness
+    real(wp) :: its_value
     integer :: p
 
     points = 0_i8
-    !$omp simd private(its_bit, steepness) reduction(ior:points)
+    !$omp simd private(its_bit, its_value) reduction(ior:points)
     do p = 1, n
       its_bit = BIT(p)
-      steepness = abs(slope(p))
-      points = ior(points, merge(its_bit, 0_i8, steepness > 0.0_wp))
+      its_value = value(p)
+      points = ior(points, merge(its_bit, 0_i8, its_value > limit))
     end do
-  end function those_with_slope
+  end function points_above
 
   !> Numbers the first nodes of all three rows, for mapping.
   pure subroutine number_rows(this, n, nx)

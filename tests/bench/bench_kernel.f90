@@ -1,7 +1,7 @@
 !> Cost per point and step on the paper's column: whole runs of the three schemes, and where the
 !> time of usl goes.
-!> Usage: bench_kernel CASE.nml [end_time [scheme [repeats]]]; with a scheme, the run of that one and
-!> no more.
+!> Usage: bench_kernel CASE.nml [end_time [scheme [repeats]]]; with a scheme, the run of that one
+!> and no more.
 !> Prints processor time, which a busy machine spoils less than wall time, and beside it the wall
 !> time, which alone tells what threads are worth; judges nothing. With repeats the same run is made
 !> so many times, and the first number adds up the least time of each few milliseconds of it (the

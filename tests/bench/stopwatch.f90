@@ -1,5 +1,5 @@
-!> A monitor that says GO_ON and notes the processor time whenever it is asked, over repeated runs of
-!> the same computation.
+!> A monitor that says GO_ON and notes the processor time whenever it is asked, over repeated runs
+!> of the same computation.
 module stopwatch
   use sg_kinds, only: wp
   use sg_monitor, only: GO_ON, monitor_t

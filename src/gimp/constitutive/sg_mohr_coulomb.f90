@@ -21,10 +21,10 @@
 !> gap.
 module sg_mohr_coulomb
   use sg_cracks, only: give_back
-  use sg_kinds, only: wp
+  use sg_kinds, only: i8, wp
   use sg_materials, only: material_t
   use sg_rounding, only: COARSENESS, LEAST_STRESS
-  use sg_weighting, only: BLOCK
+  use sg_weighting, only: BLOCK, points_above
   implicit none
   private
 
@@ -126,9 +126,9 @@ contains
     type(principal_t) :: trial
     real(wp) :: d_first, d_middle, d_last, high, middle, low, new_a, new_b, compliance(BLOCK)
     real(wp) :: centre, yield, multiplier, ratio, stress(4), opening, taken
-    ! Above 0: the plane is not where the point belongs. A real and not a logical, so that the loop
-    ! vectorises.
+    ! Above 0: the plane is not where the point belongs.
     real(wp) :: violation(BLOCK)
+    integer(i8) :: points
     integer :: p, region
 
     call find_compliance(n, material, sin_friction, sin_dilation, compliance)
@@ -164,8 +164,10 @@ contains
       szz(p) = merge(high, merge(low, middle, trial%z(p) < trial%b(p)), trial%z(p) > trial%a(p))
     end do
 
-    do p = 1, n
-      if (.not. violation(p) > material%most_violation) cycle
+    points = points_above(n, violation, material%most_violation)
+    do while (points /= 0_i8)
+      p = trailz(points) + 1
+      points = iand(points, points - 1_i8)
       call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p), &
         sin_dilation(p)], trial, p, stress, opening, region)
       sxx(p) = stress(1)
