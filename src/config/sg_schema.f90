@@ -238,8 +238,8 @@ module sg_schema
     required=.true., when='body_force', when_is='manufactured', &
     meaning='Amplitude of the manufactured solution')]
 
-  character(len=*), parameter :: NEEDLESS_WORK = 'empty_nodes gaps cracks dilation '// &
-    'exact_return deformation plastic_strain velocity_gradient wave_speed ledger'
+  character(len=*), parameter :: NEEDLESS_WORK = 'empty_nodes zero_weights gaps cracks '// &
+    'dilation exact_return deformation plastic_strain velocity_gradient wave_speed ledger'
 
   type(key_t), parameter :: SOLVER_KEYS(*) = [ &
     key_t('solver', 'model', KIND_WORD, default='gimp', choices='gimp linear_functional', &

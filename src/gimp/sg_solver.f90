@@ -68,6 +68,8 @@ module sg_solver
     logical :: finds_wave_speed = .true.
     !> The grid visits all its nodes, not only those in the window around the points.
     logical :: visits_all_nodes = .false.
+    !> Points map to and gather from the nodes of their stencils with weight zero, too.
+    logical :: weighs_all_nodes = .false.
     !> The domains of the points follow their stretch (cpGIMP).
     logical :: stretches_domains = .false.
     type(material_t), allocatable :: materials(:)
@@ -159,6 +161,7 @@ contains
     character(len=*), intent(in) :: words(:)
 
     this%visits_all_nodes = any(words == 'empty_nodes')
+    this%weighs_all_nodes = any(words == 'zero_weights')
     this%finds_wave_speed = this%finds_wave_speed .or. any(words == 'wave_speed')
     this%keeps_gradient = this%keeps_gradient .or. any(words == 'velocity_gradient')
     this%materials%closes_all_gaps = any(words == 'gaps')
@@ -511,7 +514,7 @@ contains
     associate (p => this%particles, g => this%grid)
       call this%axis_weights(n, p%x(first:last), p%width(first:last), g%x, w%i, w%sx, w%gx)
       call this%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, w%gy)
-      call w%find_stencils(n, g%x%last)
+      call w%find_stencils(n, g%x%last, this%weighs_all_nodes)
     end associate
   end subroutine find_weights
 

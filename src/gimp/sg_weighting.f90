@@ -85,10 +85,11 @@ module sg_weighting
 contains
 
   !> Numbers the first nodes of `n` points in a grid whose rows end with node `nx`, and sorts the
-  !> points by what their stencils reach.
-  pure subroutine find_stencils(this, n, nx)
+  !> points by what their stencils reach: all nodes if they are `whole`.
+  pure subroutine find_stencils(this, n, nx, whole)
     class(weights_t), intent(inout) :: this
     integer, intent(in) :: n, nx
+    logical, intent(in) :: whole
     integer(i8) :: wide, high, all_points
     integer :: p
 
@@ -96,10 +97,15 @@ contains
     do p = 1, n
       this%node(p) = this%i(p) + this%j(p)*(nx + 1)
     end do
-    ! The slope of the last node of a stencil is positive, or zero like its weight.
-    wide = points_above(n, this%gx(:, 3), 0.0_wp)
-    high = points_above(n, this%gy(:, 3), 0.0_wp)
     all_points = maskr(n, kind=i8)
+    if (whole) then
+      wide = all_points
+      high = all_points
+    else
+      ! The slope of the last node of a stencil is positive, or zero like its weight.
+      wide = points_above(n, this%gx(:, 3), 0.0_wp)
+      high = points_above(n, this%gy(:, 3), 0.0_wp)
+    end if
     this%reaching(2, 2) = iand(all_points, not(ior(wide, high)))
     this%reaching(3, 2) = iand(wide, not(high))
     this%reaching(2, 3) = iand(high, not(wide))

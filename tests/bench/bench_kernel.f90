@@ -119,7 +119,7 @@ contains
                 w%gx)
               call solver%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, &
                 w%gy)
-              call w%find_stencils(n, g%x%last)
+              call w%find_stencils(n, g%x%last, .false.)
               call w%number_rows(n, g%x%last)
             case (2)
               call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &

@@ -43,7 +43,7 @@ SCENES = {
     "column": (
         "paper/homogeneous_calibrated.nml",
         {"solver.end_time": 2.0},
-        words("empty_nodes", "gaps", "cracks", "dilation", "exact_return", "deformation", "plastic_strain")
+        words("empty_nodes", "zero_weights", "gaps", "cracks", "dilation", "exact_return", "deformation", "plastic_strain")
         | words("velocity_gradient", "ledger")
         | {
             "history each 0.02 s": {"output.history_interval": 0.02},
