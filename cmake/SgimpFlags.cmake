@@ -40,6 +40,7 @@ endif()
 
 set(SGIMP_FLAGS_ALWAYS "")
 set(SGIMP_FLAGS_RELEASE "")
+set(SGIMP_FLAGS_TRANSFER "") # of sg_transfer alone, in Release
 set(SGIMP_FLAGS_DEBUG "")
 if(CMAKE_Fortran_COMPILER_ID STREQUAL "GNU")
   set(SGIMP_FLAGS_ALWAYS -std=f2008 -fopenmp-simd)
@@ -51,6 +52,10 @@ if(CMAKE_Fortran_COMPILER_ID STREQUAL "GNU")
   # traps and the sign of zero, which lets the compiler turn max, min and merge into vector instructions. GNU Fortran
   # then also takes the liberty that the Fortran standard gives, to order sums anew where no bracket forbids it.
   set(SGIMP_FLAGS_RELEASE ${SGIMP_ARCH_FLAG} -fno-math-errno -fno-trapping-math -fno-signed-zeros)
+  # The transfers between points and nodes are written once for stencils of any number of columns and rows and called
+  # with each. Inlined there, for which the usual limits are too low, the bounds of their loops are constants and nodes
+  # stay in registers.
+  set(SGIMP_FLAGS_TRANSFER -finline-limit=2000 --param=large-stack-frame=10000)
   set(SGIMP_FLAGS_DEBUG -fcheck=all -finit-real=snan -ffpe-trap=invalid,zero,overflow -fbacktrace)
 endif()
 
@@ -65,3 +70,6 @@ string(TOUPPER "${CMAKE_BUILD_TYPE}" SGIMP_BUILD_TYPE_UPPER)
 string(JOIN " " SGIMP_COMPILER_FLAGS
   ${CMAKE_Fortran_FLAGS} ${CMAKE_Fortran_FLAGS_${SGIMP_BUILD_TYPE_UPPER}}
   ${SGIMP_FLAGS_ALWAYS} ${SGIMP_FLAGS_${SGIMP_BUILD_TYPE_UPPER}})
+if(CMAKE_BUILD_TYPE STREQUAL "Release")
+  string(JOIN " " SGIMP_COMPILER_FLAGS ${SGIMP_COMPILER_FLAGS} ${SGIMP_FLAGS_TRANSFER})
+endif()

@@ -401,10 +401,10 @@ contains
       call this%find_weights(first, last, w)
       keep_gradient = this%keeps_gradient .and. sweep%update_velocity
       if (sweep%update_stress .or. sweep%average_divergence .or. keep_gradient) then
-        call gather_motion_and_gradient(n, w, g%x%last, g%y%last, &
+        call gather_motion_and_gradient(w, g%x%last, g%y%last, &
           g%motion_store(g%motion_start), value, gradient)
       else if (sweep%update_velocity) then
-        call gather_motion(n, w, g%x%last, g%y%last, g%motion_store(g%motion_start), value)
+        call gather_motion(w, g%x%last, g%y%last, g%motion_store(g%motion_start), value)
       end if
       if (sweep%average_divergence) then
         call this%cells%add(n, p%x(first:last), p%y(first:last), p%volume(first:last), &

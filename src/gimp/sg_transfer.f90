@@ -1,8 +1,9 @@
 !> Transfers between points and nodes, a block of points at a time.
 !>
 !> Node data are interleaved so that one node is one vector of eight numbers, or two of four:
-!>   total(1:8)   mass, momentum x, momentum y, mass, then the force in two parts, fx + fx',
-!>                fy + fy': fx, fy, fx', fy'                           (sums over points)
+!>   total(1:8)   mass, momentum x, momentum y, mass again (a lane has to hold something, and
+!>                sg_boundary marks nodes there), then the force in two parts, fx + fx', fy + fy':
+!>                fx, fy, fx', fy'                                     (sums over points)
 !>   motion(1:8)  two velocities, whose meaning the time scheme chooses, the second three times:
 !>                a, a, b, b, b, b, b, b (x and y in turn)             (read by the points)
 !>
@@ -14,11 +15,12 @@
 !> With the force in two parts and the second velocity thrice, every lane of total and of motion is
 !> one product (a function of x) (a function of y) (what is mapped or gathered): S S for lanes 1 to
 !> 4, S' S for 5 and 6, S S' for 7 and 8. So a node is one multiplication and addition of eight
-!> lanes.
+!> lanes. Forces alone go to lanes 5 and 6 in full.
 !>
 !> A point reaches two or three columns of nodes and as many rows. Those of a block that reach the
 !> same go one after the other, through one text with the number of columns and rows as arguments:
-!> they are constants wherever it is called, and compiled as such once it is inlined there.
+!> they are constants wherever it is called, and compiled as such once it is inlined there. The
+!> rarer map_gradient and map_body_force take all nine nodes.
 !>
 !> Nodes are counted along rows: node (i, j) is i + j (nx + 1).
 module sg_transfer
@@ -64,8 +66,7 @@ contains
 
     points = w%reaching(columns, rows)
     do while (points /= 0_i8)
-      p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
+      call take_point(points, p)
       brought = [mass(p), mass(p)*vx(p), mass(p)*vy(p), mass(p)]
       do j = 1, rows
         node = w%row(p, j) - 1
@@ -106,12 +107,12 @@ contains
     twice = 0.0_wp
     !$omp simd reduction(+:twice)
     do p = 1, n
-      twice = twice + mass(p)/mass(1)*((gradient(1, p)**2 + gradient(2, p)**2) &
+      twice = twice + mass(p)*((gradient(1, p)**2 + gradient(2, p)**2) &
         *(w%sx(p, 1)*dx(p, 1)**2 + w%sx(p, 2)*dx(p, 2)**2 + w%sx(p, 3)*dx(p, 3)**2) &
         + (gradient(3, p)**2 + gradient(4, p)**2)*(w%sy(p, 1)*dy(p, 1)**2 &
         + w%sy(p, 2)*dy(p, 2)**2 + w%sy(p, 3)*dy(p, 3)**2))
     end do
-    energy = energy + 0.5_wp*mass(1)*twice
+    energy = energy + 0.5_wp*twice
     do p = 1, n
       do j = 1, 3
         node = w%row(p, j) - 1
@@ -170,8 +171,7 @@ contains
 
     points = w%reaching(columns, rows)
     do while (points /= 0_i8)
-      p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
+      call take_point(points, p)
       s = -volume(p)
       with_gx = [s*sxx(p), s*sxy(p)]
       with_gy = [s*sxy(p), s*syy(p)]
@@ -222,8 +222,7 @@ contains
 
     points = w%reaching(columns, rows)
     do while (points /= 0_i8)
-      p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
+      call take_point(points, p)
       s = -volume(p)
       brought = [mass(p), mass(p)*vx(p), mass(p)*vy(p), mass(p), s*sxx(p), s*sxy(p), s*sxy(p), &
         s*syy(p)]
@@ -272,9 +271,17 @@ contains
     end do
   end subroutine map_body_force
 
+  !> The first of `points`, which are bits, and not yet none: `p`. Takes it off them.
+  pure subroutine take_point(points, p)
+    integer(i8), intent(inout) :: points
+    integer, intent(out) :: p
+
+    p = trailz(points) + 1
+    points = ibclr(points, p - 1)
+  end subroutine take_point
+
   !> value(p, :) = sum of S times motion(1:4).
-  pure subroutine gather_motion(n, w, nx, ny, motion, value)
-    integer, intent(in) :: n
+  pure subroutine gather_motion(w, nx, ny, motion, value)
     type(weights_t), intent(in) :: w
     integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
@@ -298,8 +305,7 @@ contains
 
     points = w%reaching(columns, rows)
     do while (points /= 0_i8)
-      p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
+      call take_point(points, p)
       node = w%node(p) - 1
       v = 0.0_wp
       do j = 1, rows
@@ -325,8 +331,7 @@ contains
 
   !> As gather_motion; also gradient(p, :) = (d vx/dx, d vy/dx, d vx/dy, d vy/dy) of v =
   !> motion(3:4), in 1/s.
-  pure subroutine gather_motion_and_gradient(n, w, nx, ny, motion, value, gradient)
-    integer, intent(in) :: n
+  pure subroutine gather_motion_and_gradient(w, nx, ny, motion, value, gradient)
     type(weights_t), intent(in) :: w
     integer, intent(in) :: nx, ny
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
@@ -350,8 +355,7 @@ contains
 
     points = w%reaching(columns, rows)
     do while (points /= 0_i8)
-      p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
+      call take_point(points, p)
       do i = 1, columns
         s = w%sx(p, i)
         g = w%gx(p, i)

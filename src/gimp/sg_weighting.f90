@@ -25,7 +25,8 @@ module sg_weighting
   public :: gimp_axis_weights, cpgimp_axis_weights, linear_axis_weights, bspline_axis_weights
 
   !> Points that a kernel handles at a time: long enough to fill vector units, short enough for the
-  !> first cache, and no more than an integer has bits, which stand for points of a block.
+  !> first cache, and no more than an integer of kind i8 has bits, which stand for the points of a
+  !> block.
   integer, parameter :: BLOCK = 64
   !> `first_wall` or `last_wall` of an axis that is open there.
   integer, parameter :: NO_WALL = -1
@@ -36,9 +37,6 @@ module sg_weighting
   !> they are known to 1e-3 here, on 160 cells.
   real(wp), parameter :: LEAST_FIXED_WIDTH = 1.0e-11_wp*COARSENESS
 
-  integer :: point
-  integer(i8), parameter :: BIT(BLOCK) = [(shiftl(1_i8, point - 1), point=1, BLOCK)]
-
   !> Weights of up to BLOCK points.
   type :: weights_t
     !> First node of the stencil in x and y, counted from 0, and its number, i + j (nx + 1).
@@ -47,8 +45,8 @@ module sg_weighting
     integer :: row(BLOCK, 3)
     !> Weights and slopes (1/m) along x and along y: point, node of the stencil.
     real(wp) :: sx(BLOCK, 3), sy(BLOCK, 3), gx(BLOCK, 3), gy(BLOCK, 3)
-    !> Points, as bits, whose stencils reach that many columns and rows of nodes: what they bring to
-    !> the third is often zero.
+    !> Points, as bits, whose stencils reach that many columns and rows of nodes, the weights of the
+    !> third being zero elsewhere; a point that is in none of them is not mapped.
     integer(i8) :: reaching(2:3, 2:3)
   contains
     procedure :: find_stencils
@@ -78,6 +76,8 @@ module sg_weighting
       real(wp), intent(in) :: x(n), width(n)
       type(axis_t), intent(in) :: axis
       integer, intent(inout) :: base(BLOCK)
+      !> Within the grid the slope of the third node is nowhere negative, and where it is 0, so is
+      !> its weight: find_stencils leaves the node out there.
       real(wp), intent(inout) :: s(BLOCK, 3), g(BLOCK, 3)
     end subroutine axis_weights_interface
   end interface
@@ -102,7 +102,6 @@ contains
       wide = all_points
       high = all_points
     else
-      ! The slope of the last node of a stencil is positive, or zero like its weight.
       wide = points_above(n, this%gx(:, 3), 0.0_wp)
       high = points_above(n, this%gy(:, 3), 0.0_wp)
     end if
@@ -117,9 +116,11 @@ contains
   pure function points_above(n, value, limit) result(points)
     integer, intent(in) :: n
     real(wp), intent(in) :: value(BLOCK), limit
+    integer :: p
     integer(i8) :: points, its_bit
     real(wp) :: its_value
-    integer :: p
+    !> A table, since shifts by the number of the point do not vectorise.
+    integer(i8), parameter :: BIT(BLOCK) = [(shiftl(1_i8, p - 1), p=1, BLOCK)]
 
     points = 0_i8
     !$omp simd private(its_bit, its_value) reduction(ior:points)

@@ -18,8 +18,7 @@ module stopwatch
   contains
     procedure :: start
     procedure :: ask => note_and_go_on
-    procedure :: stop => note
-    procedure, private :: note
+    procedure :: stop => note_time
     procedure :: least_seconds
   end type stopwatch_t
 
@@ -38,12 +37,12 @@ contains
     class(stopwatch_t), intent(inout) :: this
     integer :: answer
 
-    call this%note()
+    call this%stop()
     answer = GO_ON
   end function note_and_go_on
 
   !> A part of the run ends.
-  subroutine note(this)
+  subroutine note_time(this)
     class(stopwatch_t), intent(inout) :: this
     real(wp) :: now
 
@@ -52,7 +51,7 @@ contains
     if (this%asked > size(this%least)) this%least = [this%least, huge(1.0_wp)]
     this%least(this%asked) = min(this%least(this%asked), now - this%last)
     this%last = now
-  end subroutine note
+  end subroutine note_time
 
   !> Sum over the parts of a run of the least processor time of each, s.
   pure function least_seconds(this) result(seconds)

@@ -126,7 +126,7 @@ contains
     type(principal_t) :: trial
     real(wp) :: d_first, d_middle, d_last, high, middle, low, new_a, new_b, compliance(BLOCK)
     real(wp) :: centre, yield, multiplier, ratio, stress(4), opening, taken
-    ! Above 0: the plane is not where the point belongs.
+    ! Above most_violation, mostly 0: the plane is not where the point belongs.
     real(wp) :: violation(BLOCK)
     integer(i8) :: points
     integer :: p, region
@@ -167,7 +167,7 @@ contains
     points = points_above(n, violation, material%most_violation)
     do while (points /= 0_i8)
       p = trailz(points) + 1
-      points = iand(points, points - 1_i8)
+      points = ibclr(points, p - 1)
       call return_special(material, [sin_friction(p), cohesion_term(p), tension_limit(p), &
         sin_dilation(p)], trial, p, stress, opening, region)
       sxx(p) = stress(1)
