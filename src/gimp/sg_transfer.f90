@@ -216,7 +216,7 @@ contains
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: mass(n), vx(n), vy(n), volume(n), sxx(n), syy(n), sxy(n)
     real(wp), intent(inout) :: total(8, 0:last)
-    real(wp) :: brought(8), along_row(8), along_column(8, 3), s, g
+    real(wp) :: brought(8), along_row(8), column(8, 3), row(8, 3), s
     integer(i8) :: points
     integer :: p, i, j, k, node
 
@@ -226,26 +226,18 @@ contains
       s = -volume(p)
       brought = [mass(p), mass(p)*vx(p), mass(p)*vy(p), mass(p), s*sxx(p), s*sxy(p), s*sxy(p), &
         s*syy(p)]
-      do i = 1, columns
-        s = w%sx(p, i)
-        g = w%gx(p, i)
-        !$omp simd simdlen(8)
-        do k = 1, 8
-          along_column(k, i) = merge(g, s, WITH_GX(k) > 0.0_wp)
-        end do
-      end do
+      call spread_weights(columns, p, w%sx, w%gx, WITH_GX, column)
+      call spread_weights(rows, p, w%sy, w%gy, WITH_GY, row)
       do j = 1, rows
         node = w%row(p, j) - 1
-        s = w%sy(p, j)
-        g = w%gy(p, j)
         !$omp simd simdlen(8)
         do k = 1, 8
-          along_row(k) = merge(g, s, WITH_GY(k) > 0.0_wp)*brought(k)
+          along_row(k) = row(k, j)*brought(k)
         end do
         do i = 1, columns
           !$omp simd simdlen(8)
           do k = 1, 8
-            total(k, node + i) = total(k, node + i) + along_column(k, i)*along_row(k)
+            total(k, node + i) = total(k, node + i) + column(k, i)*along_row(k)
           end do
         end do
       end do
@@ -270,6 +262,25 @@ contains
       end do
     end do
   end subroutine map_body_force
+
+  !> The weights `s` and slopes `g` of point `p` at the `nodes` that it reaches along an axis, as
+  !> lanes: the slope where `with_slope` is above 0, the weight elsewhere.
+  pure subroutine spread_weights(nodes, p, s, g, with_slope, lanes)
+    integer, intent(in) :: nodes, p
+    real(wp), intent(in) :: s(BLOCK, 3), g(BLOCK, 3), with_slope(8)
+    real(wp), intent(inout) :: lanes(8, 3)
+    real(wp) :: weight, slope
+    integer :: i, k
+
+    do i = 1, nodes
+      weight = s(p, i)
+      slope = g(p, i)
+      !$omp simd simdlen(8)
+      do k = 1, 8
+        lanes(k, i) = merge(slope, weight, with_slope(k) > 0.0_wp)
+      end do
+    end do
+  end subroutine spread_weights
 
   !> The first of `points`, which are bits, and not yet none: `p`. Takes it off them.
   pure subroutine take_point(points, p)
@@ -349,36 +360,28 @@ contains
     type(weights_t), intent(in) :: w
     real(wp), intent(in) :: motion(8, 0:(nx + 1)*(ny + 1) - 1)
     real(wp), intent(inout) :: value(BLOCK, 4), gradient(BLOCK, 4)
-    real(wp) :: found(8), row(8), along_column(8, 3), s, g
+    real(wp) :: found(8), along_row(8), column(8, 3), row(8, 3)
     integer(i8) :: points
     integer :: p, i, j, k, node
 
     points = w%reaching(columns, rows)
     do while (points /= 0_i8)
       call take_point(points, p)
-      do i = 1, columns
-        s = w%sx(p, i)
-        g = w%gx(p, i)
-        !$omp simd simdlen(8)
-        do k = 1, 8
-          along_column(k, i) = merge(g, s, WITH_GX(k) > 0.0_wp)
-        end do
-      end do
+      call spread_weights(columns, p, w%sx, w%gx, WITH_GX, column)
+      call spread_weights(rows, p, w%sy, w%gy, WITH_GY, row)
       node = w%node(p) - 1
       found = 0.0_wp
       do j = 1, rows
-        row = 0.0_wp
+        along_row = 0.0_wp
         do i = 1, columns
           !$omp simd simdlen(8)
           do k = 1, 8
-            row(k) = row(k) + along_column(k, i)*motion(k, node + i)
+            along_row(k) = along_row(k) + column(k, i)*motion(k, node + i)
           end do
         end do
-        s = w%sy(p, j)
-        g = w%gy(p, j)
         !$omp simd simdlen(8)
         do k = 1, 8
-          found(k) = found(k) + merge(g, s, WITH_GY(k) > 0.0_wp)*row(k)
+          found(k) = found(k) + row(k, j)*along_row(k)
         end do
         node = node + nx + 1
       end do
