@@ -99,7 +99,7 @@ module sg_solver
     procedure, private :: sweep_points
     procedure, private :: sweep_in_threads
     procedure, private :: sweep_block
-    procedure, private :: find_weights
+    procedure :: find_weights
     procedure, private :: stretch_domains
     procedure, private :: sweep_stress
     procedure, private :: average_pressure

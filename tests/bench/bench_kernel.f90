@@ -146,9 +146,7 @@ contains
         if (work + wave_squared > huge(1.0_wp)) print '(a)', 'not finite'
         return
       end if
-      call solver%axis_weights(n, p%x(first:last), p%width(first:last), g%x, w%i, w%sx, w%gx)
-      call solver%axis_weights(n, p%y(first:last), p%height(first:last), g%y, w%j, w%sy, w%gy)
-      call w%find_stencils(n, g%x%last, whole=.false.)
+      call solver%find_weights(first, last, w)
       call w%number_rows(n, g%x%last)
       if (part == GATHER) then
         call gather_motion_and_gradient(w, g%x%last, g%y%last, g%motion_store(g%motion_start), &
